@@ -47,7 +47,6 @@ std::uint32_t Dressing::still_samples(const scene::View& view, const scene::Colo
 void Dressing::put_on(frame::Frame& frame, const scene::View& view, const scene::Cut& cut,
                       const scene::Eye& eye, const scene::Colouring& colouring, bool playing,
                       const scene::Chooser::Painter& painter, const DressingLimits& limits) {
-  rest();
   surfaces.show(frame, colouring, playing);
   // Where there is time to make pieces there is some for what the pixels can show: a voxel is some pixels wide, and half of the
   // triangles are averted.
@@ -59,12 +58,17 @@ void Dressing::put_on(frame::Frame& frame, const scene::View& view, const scene:
     skin.show(frame, cut, eye, colouring, painter, most);
   else if (view.skin && forced(colouring))
     skin.show(frame, cut, eye, alone(colouring), painter, most);
+  else
+    skin.rest();
+  skins += skin.figures();
   if (!synapses) return;
   const bool taken = playing && view.synapses == scene::SynapseColour::target;
-  chosen =
+  of_frame_ =
       synapses->choose(eye, colouring, taken ? scene::SynapseColour::sign : view.synapses, limits.synapses);
+  chosen.balls.insert(chosen.balls.end(), of_frame_.balls.begin(), of_frame_.balls.end());
+  chosen.synapses.insert(chosen.synapses.end(), of_frame_.synapses.begin(), of_frame_.synapses.end());
   scene::paint_synapses(frame.palette, view.background);
-  frame.balls = chosen.balls;
+  frame.balls = of_frame_.balls;
 }
 
 }  // namespace forest

@@ -25,7 +25,8 @@ struct Dressing {
   scene::Skin skin;
   bool skinned = false;  // all neurons near the eye have one, not only those that a target forces to
   std::optional<scene::Synapses> synapses;  // none: nothing is known of any
-  scene::Synapses::Choice chosen;           // those of the last picture
+  scene::Synapses::Choice chosen;           // those of the last picture, of all its layers
+  scene::Skin::Figures skins;               // likewise
 
   /// Whether a picture of the view shows anything of them.
   bool wanted(const scene::View& view, const scene::Colouring& colouring) const;
@@ -33,13 +34,16 @@ struct Dressing {
   bool sees_through(const scene::View& view, const scene::Colouring& colouring) const;
   /// scene::still_samples, which skin that begins and surfaces that are seen through need, too.
   std::uint32_t still_samples(const scene::View& view, const scene::Colouring& colouring) const;
+  /// A picture begins, of one frame or of several layers.
+  void begin() { chosen = {}, skins = {}; }
   /// Adds them to a frame composed of `cut`, as the view wants them. The frame must not outlive this object, or its next call.
   /// @param playing  activity takes the palette entries of branches
   void put_on(frame::Frame& frame, const scene::View& view, const scene::Cut& cut, const scene::Eye& eye,
               const scene::Colouring& colouring, bool playing, const scene::Chooser::Painter& painter,
               const DressingLimits& limits = {});
-  /// A picture without any of them.
-  void rest() { skin.rest(), chosen = {}; }
+
+ private:
+  scene::Synapses::Choice of_frame_;
 };
 
 }  // namespace forest

@@ -64,22 +64,21 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
       playback_->colour(cut, from, look, {.window = window_, .states = colouring.states});
     };
   auto start = Clock::now();
+  dressing_.begin();
   // A card draws no large pixels: they save work of the processor's kind.
   if (scene::layered(view) && (view.detail.gaze || !on_card())) {
     Foveated::Dresser dress;
     if (dressing_.wanted(view, colouring))
       dress = [&](frame::Frame& frame, const scene::Cut& near, const scene::Eye& eye) {
         dressing_.put_on(frame, view, near, eye, colouring, coloured, painter);
-        drawn.synapses += dressing_.chosen.balls.size();
       };
-    else
-      dressing_.rest();
     drawn.image =
         foveated_.draw(view, width, height, colouring, lines, glass, 0, view.samples, painter, dress);
     for (std::size_t i = 3; i < drawn.image.pixels.size(); i += 4) drawn.image.pixels[i] = 255;
     const Foveated::Figures& f = foveated_.figures();
     drawn.cull = f.cull, drawn.draw = f.draw, drawn.read = f.unite;
     drawn.segments = f.segments, drawn.reached = f.drawn, drawn.neurons = f.neurons;
+    drawn.synapses = dressing_.chosen.balls.size();
     if (playback_) drawn.activity = playback_->figures();
     return drawn;
   }

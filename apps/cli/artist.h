@@ -74,7 +74,7 @@ class Artist {
   void give_skin() { dressing_.skinned = true; }
   /// From now on these synapses are in the pictures, unless the view says otherwise.
   void show(scene::Synapses synapses) { dressing_.synapses.emplace(std::move(synapses)); }
-  const scene::Skin& skin() const { return dressing_.skin; }
+  const scene::Skin::Figures& skins() const { return dressing_.skins; }
   /// ms that each picture stands for, for pictures that leave out steps.
   void set_window(double milliseconds) { window_ = milliseconds; }
   const scene::Playback* playback() const { return playback_ ? &*playback_ : nullptr; }

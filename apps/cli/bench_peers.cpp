@@ -177,12 +177,7 @@ Polylines polylines_of(const scene::Forest& forest, const scene::Neuron& neuron)
 /// What bench/peers/vtk_column.py reads.
 void write_column(const scene::Forest& forest, const Options& options, const fs::path& folder) {
   const auto list = [](const Vec3& v) { return Json{v.x(), v.y(), v.z()}; };
-  const auto srgb = [&](const Vec3& linear) {
-    return list(linear.unaryExpr([](float c) {
-      c = std::clamp(c, 0.f, 1.f);
-      return c <= .0031308f ? 12.92f * c : 1.055f * std::pow(c, 1.f / 2.4f) - .055f;
-    }));
-  };
+  const auto srgb = [&](const Vec3& light) { return list(scene::screen_of(light)); };
   const auto [width, height] = parse_size(options.size);
   const scene::Dolly dolly(forest);
   const scene::View first = view_at(dolly, 0, 1);

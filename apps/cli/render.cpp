@@ -179,7 +179,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
     console.print({{"file", options->out.string()},
                    {"activity", activity},
                    {"surfaces", of_surfaces},
-                   {"skin_triangles", artist.skin().figures().triangles},
+                   {"skin_triangles", artist.skins().triangles},
                    {"view", nlohmann::ordered_json::parse(scene::to_json(view))},
                    {"neurons", drawn.neurons},
                    {"segments", drawn.segments},

@@ -391,16 +391,14 @@ void Viewport::draw_part(const scene::View& of, std::uint32_t first, std::uint32
   }
   dressing_.skinned = settings_.skin;
   dressing_.surfaces.visibility = settings_.surfaces ? settings_.surface_opacity : 0.f;
+  dressing_.begin();
   figures_.synapses = figures_.triangles = 0;
   Foveated::Dresser dress;
   if (dressing_.wanted(view, colouring))
     dress = [&](frame::Frame& to, const scene::Cut& cut, const scene::Eye& eye) {
       dressing_.put_on(to, view, cut, eye, colouring, coloured, painter, limits);
-      figures_.synapses += dressing_.chosen.balls.size(),
-          figures_.triangles += dressing_.skin.figures().triangles;
+      figures_.synapses = dressing_.chosen.balls.size(), figures_.triangles = dressing_.skins.triangles;
     };
-  else
-    dressing_.rest();
   if (layered(view)) {
     if (!foveated_) foveated_.emplace(forest_, [] { return std::make_unique<render::CpuRenderer>(); });
     united_ = &foveated_->draw(view, w, h, colouring, overlays, glass, first, last, painter, dress);
@@ -447,7 +445,7 @@ void Viewport::refine() {
   const std::uint32_t until = std::min(samples, (refined_ / group + affordable) * group);
   draw_still(samples, refined_, until, {.skin = {.new_pieces = still_pieces}});
   sample_milliseconds_ = std::max(.5f, float(clock.nsecsElapsed()) * 1e-6f / float(until - refined_));
-  refined_ = dressing_.skin.figures().missing ? 0 : until;  // more of it is there the next time
+  refined_ = dressing_.skins.missing ? 0 : until;  // more of it is there the next time
   if (refined_ == samples) stage_ = Stage::finished;
 }
 

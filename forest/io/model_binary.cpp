@@ -10,6 +10,7 @@
 
 #include "forest/core/bounds.h"
 #include "forest/core/error.h"
+#include "forest/core/srgb.h"
 #include "forest/io/model_writers.h"
 
 namespace forest::io {
@@ -47,8 +48,7 @@ std::vector<std::array<std::uint32_t, 2>> edges_of(const Lines& lines) {
 
 /// A part of sRGB as light, in 65535ths: colours of vertices are linear in glTF.
 std::uint16_t linear(std::uint8_t part) {
-  const double s = double(part) / 255.;
-  return std::uint16_t(std::lround(65535. * (s <= .04045 ? s / 12.92 : std::pow((s + .055) / 1.055, 2.4))));
+  return std::uint16_t(std::lround(65535. * from_srgb(double(part) / 255.)));
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "forest/core/srgb.h"
+
 namespace forest::scene {
 namespace {
 
@@ -35,8 +37,6 @@ constexpr ColourMap maps[] = {
     {"grey", "evenly in sRGB", grey},
 };
 
-float linear(float c) { return c <= .04045f ? c / 12.92f : std::pow((c + .055f) / 1.055f, 2.4f); }
-
 }  // namespace
 
 Vec3 ColourMap::screen(float t) const {
@@ -50,7 +50,7 @@ Vec3 ColourMap::screen(float t) const {
 
 Vec3 ColourMap::operator()(float t) const {
   const Vec3 c = screen(t);
-  return {linear(c.x()), linear(c.y()), linear(c.z())};
+  return {from_srgb(c.x()), from_srgb(c.y()), from_srgb(c.z())};
 }
 
 std::span<const ColourMap> colour_maps() { return maps; }

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/core/srgb.h"
 #include "forest/scene/view.h"
 
 namespace forest::scene {
@@ -18,8 +19,6 @@ namespace {
 constexpr std::size_t most_hues = 60'000, most_rows = 250;
 constexpr std::size_t depth_steps = 10;
 constexpr std::uint32_t grey = 0xBBBBBB;
-
-float linear(float srgb) { return srgb <= .04045f ? srgb / 12.92f : std::pow((srgb + .055f) / 1.055f, 2.4f); }
 
 // Okabe & Ito (2008), safe for colour-blind eyes, ordered so that neighbours contrast; then lighter companions.
 constexpr std::array<std::uint32_t, 14> categorical{0xE69F00, 0x56B4E9, 0x009E73, 0xF0E442, 0xCC79A7,
@@ -516,15 +515,12 @@ class Painter {
 }  // namespace
 
 Vec3 light_of(std::uint32_t rgb) {
-  return {linear(float(rgb >> 16 & 255) / 255.f), linear(float(rgb >> 8 & 255) / 255.f),
-          linear(float(rgb & 255) / 255.f)};
+  return {from_srgb(float(rgb >> 16 & 255) / 255.f), from_srgb(float(rgb >> 8 & 255) / 255.f),
+          from_srgb(float(rgb & 255) / 255.f)};
 }
 
 Vec3 screen_of(const Vec3& light) {
-  return light.unaryExpr([](float c) {
-    c = std::clamp(c, 0.f, 1.f);
-    return c <= .0031308f ? 12.92f * c : 1.055f * std::pow(c, 1.f / 2.4f) - .055f;
-  });
+  return light.unaryExpr([](float c) { return to_srgb(std::clamp(c, 0.f, 1.f)); });
 }
 
 Colouring colour(const Targets& targets, const View& view) { return Painter(targets, view).paint(); }

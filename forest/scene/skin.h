@@ -64,6 +64,10 @@ class Skin {
 
   struct Figures {
     std::size_t pieces = 0, made = 0, missing = 0, triangles = 0;
+    Figures& operator+=(const Figures& more) {
+      pieces += more.pieces, made += more.made, missing += more.missing, triangles += more.triangles;
+      return *this;
+    }
   };
   const Figures& figures() const { return figures_; }  // of the last picture
   void rest() { figures_ = {}; }                       // a picture without any

@@ -7,6 +7,7 @@
 
 #include "forest/core/parallel.h"
 #include "forest/core/round_numbers.h"
+#include "forest/core/srgb.h"
 #include "forest/scene/lettering.h"
 
 namespace forest::scene {
@@ -39,10 +40,7 @@ Vec3 fill_of(const Colouring& colouring, const Profile& p, const Ground& ground)
   return base.cwiseMin(1.f) * (1.f - ground.tint) + ground.paper * ground.tint;
 }
 
-float srgb(float c) {
-  c = std::clamp(c, 0.f, 1.f);
-  return c <= .0031308f ? 12.92f * c : 1.055f * std::pow(c, 1.f / 2.4f) - .055f;
-}
+float srgb(float c) { return to_srgb(std::clamp(c, 0.f, 1.f)); }
 
 std::string hex(const Vec3& linear) {
   const auto byte = [](float c) { return std::lround(255.f * srgb(c)); };

@@ -102,7 +102,7 @@ void Surfaces::colour(std::span<const float> values) {
     throw Error(
         fmt::format("there are {} values and the surface has {} vertices; give the values of this surface",
                     values.size(), one.mesh.positions.size()));
-  one.values.assign(values.begin(), values.end());
+  one.values.assign(values.begin(), values.end()), one.areas.clear();
   learn_values();
 }
 

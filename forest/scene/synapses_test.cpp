@@ -214,7 +214,7 @@ TEST(Synapses, SitOnlyOnBranchesThatAPictureOfOneSampleDraws) {
     fine.error = coarse.error = .001f, coarse.thinnest = 4.f;
     const Eye eye = s.eye(from, {0, 300, 0}, coarse);
     std::set<std::pair<std::uint32_t, std::uint32_t>> drawn;
-    const Cut cut = choose(s.forest, eye, viewport, s.colouring.shown());
+    const Cut cut = choose(s.forest, eye, s.colouring.shown());
     for (const frame::Item& item : cut.lines)
       for (std::uint32_t i = 0; i < frame::cluster_size; ++i)
         if (item.drawn >> i & 1u) drawn.insert({item.instance, item.first_segment + i});

@@ -8,6 +8,7 @@
 
 #include "forest/core/clones.h"
 #include "forest/core/parallel.h"
+#include "forest/core/srgb.h"
 #include "forest/frame/constants.h"
 #include "forest/render/cpu/window.h"
 
@@ -21,17 +22,13 @@ constexpr std::size_t steps = 4096;         // of the table from light to sRGB
 constexpr float unit = float(1 << 17);      // of fixed point: 1,024 samples of a light of 8 fit
 constexpr float brightest = 8.f;
 
-double srgb(double light) {
-  return light <= .0031308 ? 12.92 * light : 1.055 * std::pow(light, 1. / 2.4) - .055;
-}
-
 // 255 × sRGB of light 0–1 in even steps: of each step the value it begins with, above the lower 12 bits, and in these how
 // much it rises, both in units of 2⁻¹². One look gives both.
 using Codes = std::array<std::uint32_t, steps + 1>;
 const Codes& codes() {
   static const Codes table = [] {
     const auto code = [](std::size_t step) {
-      return std::uint32_t(std::lround(4096. * 255. * std::min(1., srgb(double(step) / double(steps)))));
+      return std::uint32_t(std::lround(4096. * 255. * std::min(1., to_srgb(double(step) / double(steps)))));
     };
     Codes t{};
     for (std::size_t i = 0; i < t.size(); ++i) t[i] = code(i) << 12 | (code(i + 1) - code(i));

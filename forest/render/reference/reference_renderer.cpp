@@ -11,6 +11,7 @@
 #include "forest/core/error.h"
 #include "forest/core/half.h"
 #include "forest/core/parallel.h"
+#include "forest/core/srgb.h"
 #include "forest/frame/constants.h"
 
 namespace forest::render {
@@ -492,11 +493,6 @@ class Canvas {
   frame::Constants glass_{};
 };
 
-float srgb(float c) {
-  c = std::clamp(c, 0.f, 1.f);
-  return c <= .0031308f ? 12.92f * c : 1.055f * std::pow(c, 1.f / 2.4f) - .055f;
-}
-
 }  // namespace
 
 frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
@@ -644,7 +640,8 @@ frame::Image ReferenceRenderer::read() {
   for (std::size_t i = 0; i < sums_.size(); ++i) {
     const Vec4 mean = sums_[i] / float(std::max(samples_, 1u));
     for (int c = 0; c < 3; ++c)
-      image.pixels[4 * i + std::size_t(c)] = std::uint8_t(255.f * srgb(mean[c] * exposure_) + .5f);
+      image.pixels[4 * i + std::size_t(c)] =
+          std::uint8_t(255.f * to_srgb(std::clamp(mean[c] * exposure_, 0.f, 1.f)) + .5f);
     image.pixels[4 * i + 3] = 255;
     covered += double(mean.w());
   }
