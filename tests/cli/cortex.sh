@@ -212,6 +212,17 @@ refuses 'is read here' $BRAINFOREST cortex faces e.h5 -o m.gii --values e.h5 --f
 refuses 'is read here' $BRAINFOREST cortex surfaces s.contours -o s.contours i.gii --force
 refuses 'is read here' $BRAINFOREST cortex contours s.contours -o s.contours --force
 for file in e.h5 s.contours; do cmp $file kept.$file; done
+$BRAINFOREST cortex contours s.contours -o sections --straight >/dev/null
+cp -r sections kept.sections
+mkdir linked && ln -s ../sections/section_0005.svg linked
+for file in sections/section_0005.svg ./sections/../sections/section_0005.svg linked/section_0005.svg; do
+  refuses 'holds what is read here' $BRAINFOREST cortex contours $file -o sections --force
+done
+diff -r sections kept.sections
+$BRAINFOREST cortex contours linked/section_0005.svg -o linked/sections --straight >/dev/null
+cp dent.border kept.border
+refuses 'is read here' $BRAINFOREST cortex lines outer inner -o dent.border --borders pole.border dent.border --force
+cmp dent.border kept.border
 
 # What could not be written in the end is refused before the work; nothing is left behind.
 refuses 'its folder is not there' $BRAINFOREST cortex build outer inner -o nowhere/e.h5
