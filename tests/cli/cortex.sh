@@ -158,6 +158,7 @@ told distance.json 'all(0 < r["median"] < r["mean"] * 2 < .5 and r["p95"] <= r["
 $BRAINFOREST cortex distance outer outer --json >self.json
 told self.json 'all(r["greatest"] < 1e-6 for r in d)'
 [ "$(grep -vc '^#' away.txt)" = "$(python3 -c 'import json;print(json.load(open("distance.json"))[2]["count"])')" ]
+told distance.json '[r["each"] for r in d] == [.25, .25, None, None]'
 refuses 'already' $BRAINFOREST cortex distance outer inner --values away.txt
 refuses 'no_such' $BRAINFOREST cortex distance outer no_such
 refuses 'check that both are in mm' $BRAINFOREST cortex distance outer small
