@@ -6,7 +6,6 @@
 #include <cmath>
 #include <compare>
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -246,32 +245,20 @@ cortex::ContourStack of_volume(const cortex::Volume& volume, const fs::path& pat
 
 // Where contours cross: one sentence for each two boundaries, and how often as a list.
 nlohmann::ordered_json tell_crossings(const cortex::ContourStack& stack, Console& console) {
-  struct Two {
-    std::size_t count = 0, sections = 0;
-    cortex::ContourCrossing first, last;
-  };
-  std::map<std::pair<std::uint32_t, std::uint32_t>, Two> twos;
-  for (const cortex::ContourCrossing& crossing : cortex::crossings(stack)) {
-    Two& two = twos[{crossing.object, crossing.other}];
-    if (!two.count) two.first = crossing;
-    two.sections += !two.count || two.last.section != crossing.section;
-    ++two.count, two.last = crossing;
-  }
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const auto& [objects, two] : twos) {
-    const std::string &one = stack.objects[objects.first], &other = stack.objects[objects.second];
-    const double at = stack.sections[two.first.section].at / 1e3, x = two.first.place.x() / 1e3,
-                 y = two.first.place.y() / 1e3;
+  for (const cortex::Crossings& two : cortex::crossings(stack)) {
+    const std::string &one = stack.objects[two.object], &other = stack.objects[two.other];
+    const double at = stack.sections[two.section].at / 1e3, x = two.place.x() / 1e3, y = two.place.y() / 1e3;
     list.push_back({{"objects", {one, other}},
-                    {"places", two.count},
+                    {"places", two.places},
                     {"sections", two.sections},
                     {"first", {{"at", at}, {"place", {x, y}}}}});
     console.warn(
         fmt::format("{} cross at {} in {}, first in section {} ({:.6g} mm) at ({:.6g}, {:.6g}) mm; {}",
                     one == other ? fmt::format("contours of '{}'", one)
                                  : fmt::format("contours of '{}' and '{}'", one, other),
-                    counted(two.count, "place"), counted(two.sections, "section"), two.first.section + 1, at,
-                    x, y, one == other ? "draw them apart" : "there is no tissue between them there"));
+                    counted(two.places, "place"), counted(two.sections, "section"), two.section + 1, at, x, y,
+                    one == other ? "draw them apart" : "there is no tissue between them there"));
   }
   return list;
 }

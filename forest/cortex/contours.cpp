@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <tuple>
 #include <unordered_map>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -91,9 +93,9 @@ struct Crossing {
   Place place;
   std::size_t first, second;  // contours
 };
-std::vector<Crossing> crossings_in(std::span<const std::vector<Place>> polygons,
-                                   std::size_t most = ~std::size_t(0)) {
-  std::vector<Crossing> found;
+// Shows each, from left to right about, until `see` returns false.
+template <class See>
+void each_crossing(std::span<const std::vector<Place>> polygons, See see) {
   struct Side {
     Place a, b;
     std::size_t polygon, index;
@@ -119,18 +121,29 @@ std::vector<Crossing> crossings_in(std::span<const std::vector<Place>> polygons,
       const Place u = one.b - one.a, v = other.b - other.a;
       const double a = cross(u, other.a - one.a), b = cross(u, other.b - one.a);
       const double c = cross(v, one.a - other.a), d = cross(v, one.b - other.a);
-      if (a * b < 0. && c * d < 0.)
-        found.push_back({one.a + c / (c - d) * u, std::min(one.polygon, other.polygon),
-                         std::max(one.polygon, other.polygon)});
-      if (found.size() == most) return found;
+      if (a * b < 0. && c * d < 0. &&
+          !see(Crossing{one.a + c / (c - d) * u, std::min(one.polygon, other.polygon),
+                        std::max(one.polygon, other.polygon)}))
+        return;
     }
     open.push_back(k);
   }
+}
+std::vector<Crossing> crossings_in(std::span<const std::vector<Place>> polygons) {
+  std::vector<Crossing> found;
+  each_crossing(polygons, [&](const Crossing& crossing) {
+    found.push_back(crossing);
+    return true;
+  });
   return found;
 }
 std::optional<Crossing> crossing_in(std::span<const std::vector<Place>> polygons) {
-  const auto found = crossings_in(polygons, 1);
-  return found.empty() ? std::nullopt : std::optional(found.front());
+  std::optional<Crossing> found;
+  each_crossing(polygons, [&](const Crossing& crossing) {
+    found = crossing;
+    return false;
+  });
+  return found;
 }
 
 }  // namespace
@@ -212,22 +225,29 @@ std::string fault_of(const ContourStack& stack) {
   return {};
 }
 
-std::vector<ContourCrossing> crossings(const ContourStack& stack) {
-  std::vector<std::vector<ContourCrossing>> of_section(stack.sections.size());
+std::vector<Crossings> crossings(const ContourStack& stack) {
+  using Two = std::pair<std::uint32_t, std::uint32_t>;
+  std::vector<std::map<Two, Crossings>> of_section(stack.sections.size());
   parallel_for(stack.sections.size(), 1, [&](std::size_t i) {
     const Section& section = stack.sections[i];
     std::vector<std::vector<Place>> polygons;
     for (const Contour& contour : section.contours) polygons.push_back(flattened(contour.curve, fine));
-    for (const Crossing& crossing : crossings_in(polygons)) {
-      const auto [object, other] =
+    each_crossing(polygons, [&](const Crossing& crossing) {
+      const Two two =
           std::minmax(section.contours[crossing.first].object, section.contours[crossing.second].object);
-      of_section[i].push_back({i, object, other, crossing.place});
-    }
-    std::ranges::stable_sort(of_section[i], {}, [](const auto& c) { return c.place.x(); });
+      Crossings& here = of_section[i].try_emplace(two, two.first, two.second, 0u, 1u, i).first->second;
+      if (here.places++ == 0 || crossing.place.x() < here.place.x()) here.place = crossing.place;
+      return true;
+    });
   });
-  std::vector<ContourCrossing> all;
-  for (const auto& some : of_section) all.insert(all.end(), some.begin(), some.end());
-  return all;
+  std::map<Two, Crossings> all;
+  for (const auto& some : of_section)
+    for (const auto& [two, here] : some)
+      if (const auto [there, first] = all.emplace(two, here); !first)
+        there->second.places += here.places, ++there->second.sections;
+  std::vector<Crossings> result;
+  for (const auto& [two, one] : all) result.push_back(one);
+  return result;
 }
 
 Place flat(const Eigen::Vector3d& point, Axis axis) {

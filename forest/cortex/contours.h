@@ -56,15 +56,16 @@ struct ContourStack {
 /// that numbers are finite, sections ascend, and no contour of an object crosses itself or another one of it.
 std::string fault_of(const ContourStack& stack);
 
-/// A place where two contours of a section cross, or one itself.
-struct ContourCrossing {
-  std::size_t section = 0;
+/// How often contours of two objects cross, or of one and the same.
+struct Crossings {
   std::uint32_t object = 0, other = 0;  // object <= other
-  Place place = Place::Zero();          // µm, in the section
+  std::size_t places = 0, sections = 0;
+  std::size_t section = 0;      // the first
+  Place place = Place::Zero();  // µm, in that section the leftmost
 };
-/// All of them, also those of different objects: there the tissue between the two has no thickness. By sections, then by place
-/// from left to right. On all cores.
-std::vector<ContourCrossing> crossings(const ContourStack& stack);
+/// Of all objects that do, also of different ones: there the tissue between the two has no thickness. By object, then by the
+/// other. On all cores.
+std::vector<Crossings> crossings(const ContourStack& stack);
 
 inline constexpr double largest_brain =
     1e6;  // µm: what reaches farther has another unit; a whale's is .3 m long

@@ -207,7 +207,7 @@ TEST(FaultOf, NamesThePlaceWhereContoursCross) {
   EXPECT_NE(fault_of(broken), "");
 }
 
-TEST(Crossings, AreAllToldAlsoBetweenObjects) {
+TEST(Crossings, AreCountedAlsoBetweenObjects) {
   const std::vector<Place> square{{0., 0.}, {4000., 0.}, {4000., 4000.}, {0., 4000.}};
   auto shifted = square;
   for (Place& p : shifted) p += Place(2000., 1000.);
@@ -216,21 +216,24 @@ TEST(Crossings, AreAllToldAlsoBetweenObjects) {
   stack.sections.insert(stack.sections.begin(),
                         Section{.at = 0., .contours = {stack.sections[0].contours[0]}});
   auto found = crossings(stack);
-  ASSERT_EQ(found.size(), 2u);
-  for (const auto& crossing : found) {
-    EXPECT_EQ(crossing.section, 1u);
-    EXPECT_EQ(crossing.object, 0u);
-    EXPECT_EQ(crossing.other, 0u);
-  }
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].section, 1u);
+  EXPECT_EQ(found[0].object, 0u);
+  EXPECT_EQ(found[0].other, 0u);
+  EXPECT_EQ(found[0].places, 2u);
   EXPECT_EQ(found[0].place, Place(2000., 4000.));
-  EXPECT_EQ(found[1].place, Place(4000., 1000.));
   // An inner contour that leaves the outer one is no fault of either, and told.
   stack.sections[1].contours[1].object = 1;
+  stack.sections.push_back(stack.sections[1]);
+  stack.sections[2].at += 1000.;
   EXPECT_EQ(fault_of(stack), "");
   found = crossings(stack);
-  ASSERT_EQ(found.size(), 2u);
+  ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].object, 0u);
   EXPECT_EQ(found[0].other, 1u);
+  EXPECT_EQ(found[0].places, 4u);
+  EXPECT_EQ(found[0].sections, 2u);
+  stack.sections.pop_back();
   for (Place& p : shifted) p = Place(1000., 1000.) + .25 * p;
   stack.sections[1].contours[1].curve = straight_loop(shifted);
   EXPECT_TRUE(crossings(stack).empty());
