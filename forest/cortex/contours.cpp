@@ -86,6 +86,13 @@ std::vector<Contour> cut_one(const Mesh& surface, Axis axis, double at,
   return contours;
 }
 
+// Which contours of a section an object has, of those that have some.
+std::map<std::uint32_t, std::vector<std::size_t>> of_objects(const Section& section) {
+  std::map<std::uint32_t, std::vector<std::size_t>> found;
+  for (std::size_t i = 0; i < section.contours.size(); ++i) found[section.contours[i].object].push_back(i);
+  return found;
+}
+
 constexpr double fine = .2;  // µm: so near are polygons to curves where it is asked what crosses
 
 // Where two edges of a section's polygons cross that share no end.
@@ -156,6 +163,7 @@ std::optional<Place> twin_in(const std::vector<std::vector<Place>>& polygons) {
   struct Shape {
     double area;
     Place middle;
+    double along;  // askew, since those of pixels lie in rows and columns
   };
   std::vector<Shape> shapes;
   for (const auto& polygon : polygons) {
@@ -167,13 +175,16 @@ std::optional<Place> twin_in(const std::vector<std::vector<Place>>& polygons) {
       twice += part, middle += part / 3. * (a + b);
     }
     if (twice == 0.) continue;
-    const Shape shape{std::abs(twice) / 2., polygon[0] + middle / twice};
-    for (const Shape& other : shapes)
-      if (std::abs(shape.area - other.area) < same * shape.area &&
-          (shape.middle - other.middle).norm() < same * std::sqrt(shape.area))
-        return shape.middle;
-    shapes.push_back(shape);
+    const Place at = polygon[0] + middle / twice;
+    shapes.push_back({std::abs(twice) / 2., at, at.dot(Place(std::cos(1.), std::sin(1.)))});
   }
+  std::ranges::stable_sort(shapes, {}, &Shape::along);
+  for (auto one = shapes.begin(); one != shapes.end(); ++one)
+    for (auto next = one + 1; next != shapes.end() && next->along - one->along < same * std::sqrt(one->area);
+         ++next)
+      if (std::abs(one->area - next->area) < same * one->area &&
+          (one->middle - next->middle).norm() < same * std::sqrt(one->area))
+        return one->middle;
   return std::nullopt;
 }
 
@@ -203,10 +214,10 @@ std::string fault_of(const ContourStack& stack) {
   std::vector<std::string> faults(stack.sections.size());
   parallel_for(stack.sections.size(), 1, [&](std::size_t i) {
     const Section& section = stack.sections[i];
-    for (std::uint32_t object = 0; object < stack.objects.size() && faults[i].empty(); ++object) {
+    for (const auto& [object, who] : of_objects(section)) {
+      if (!faults[i].empty()) break;
       std::vector<std::vector<Place>> polygons;
-      for (const Contour& contour : section.contours)
-        if (contour.object == object) polygons.push_back(flattened(contour.curve, fine));
+      for (const std::size_t c : who) polygons.push_back(flattened(section.contours[c].curve, fine));
       if (const auto twin = twin_in(polygons))
         faults[i] = fmt::format(
             "'{}' has one contour twice in section {} ({:.6g} mm), by ({:.6g}, {:.6g}) mm; leave "
@@ -377,10 +388,8 @@ ContourStack fitted(const ContourStack& stack, const FitOptions& options, FitSum
   progress.begin("parting curves", result.sections.size());
   parallel_for(result.sections.size(), 1, [&](std::size_t k) {
     const Section& section = result.sections[k];
-    for (std::uint32_t object = 0; object < stack.objects.size(); ++object) {
-      std::vector<std::size_t> who;
-      for (std::size_t i = 0; i < section.contours.size(); ++i)
-        if (section.contours[i].object == object) who.push_back(first_of[k] + i);
+    for (auto& [object, who] : of_objects(section)) {
+      for (std::size_t& i : who) i += first_of[k];
       std::vector<Emphasis> closer;
       std::vector<bool> kept(who.size());
       for (std::size_t i = 0; i < who.size(); ++i) kept[i] = !given[who[i]].polygon();

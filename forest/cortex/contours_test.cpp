@@ -207,6 +207,17 @@ TEST(FaultOf, NamesThePlaceWhereContoursCross) {
   EXPECT_NE(fault_of(broken), "");
 }
 
+TEST(FaultOf, KnowsAContourThatIsThereTwiceAmongMany) {
+  std::vector<std::vector<Place>> rows;
+  for (int i = 0; i < 400; ++i) {
+    const Place at(10. * (i % 20), 10. * (i / 20));
+    rows.push_back({at, at + Place(5., 0.), at + Place(5., 5.), at + Place(0., 5. + .01 * i)});
+  }
+  EXPECT_EQ(fault_of(drawn(rows)), "");
+  rows.push_back({rows[217].rbegin(), rows[217].rend()});
+  EXPECT_NE(fault_of(drawn(rows)).find("one contour twice"), std::string::npos) << fault_of(drawn(rows));
+}
+
 TEST(Crossings, AreCountedAlsoBetweenObjects) {
   const std::vector<Place> square{{0., 0.}, {4000., 0.}, {4000., 4000.}, {0., 4000.}};
   auto shifted = square;
