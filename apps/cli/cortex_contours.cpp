@@ -481,6 +481,8 @@ std::function<void()> cortex_compare(CLI::App& command, Console& console) {
     if (stack.sections.size() < 2)
       throw Error(fmt::format("{}: has {}; two are compared", o->file.string(),
                               counted(stack.sections.size(), "section")));
+    if (const std::string fault = cortex::fault_of_numbers(stack); !fault.empty())
+      throw Error(o->file.string() + ": " + fault);
     if (!o->object.empty() && std::ranges::find(stack.objects, o->object) == stack.objects.end())
       throw Error(fmt::format("{}: has no object '{}'; it has {}", o->file.string(), o->object,
                               fmt::join(stack.objects, ", ")));

@@ -190,7 +190,8 @@ std::optional<Place> twin_in(const std::vector<std::vector<Place>>& polygons) {
 
 }  // namespace
 
-std::string fault_of(const ContourStack& stack) {
+std::string fault_of_numbers(const ContourStack& stack) {
+  Place low = Place::Constant(HUGE_VAL), high = -low;
   for (std::size_t i = 0; i < stack.sections.size(); ++i) {
     const Section& section = stack.sections[i];
     if (!std::isfinite(section.at)) return fmt::format("section {} is at no number; say where it is", i + 1);
@@ -209,8 +210,19 @@ std::string fault_of(const ContourStack& stack) {
               "a contour of '{}' in section {} ({:.6g} mm) has a coordinate that is no number; trace "
               "it again",
               object, i + 1, section.at / 1e3);
+      for (const Place& point : contour.curve.points) low = low.cwiseMin(point), high = high.cwiseMax(point);
     }
   }
+  double extent = stack.sections.empty() ? 0. : stack.sections.back().at - stack.sections.front().at;
+  if (low.x() <= high.x()) extent = std::max(extent, (high - low).maxCoeff());
+  if (extent > largest_brain)
+    return fmt::format("the contours spread over {:.3g} m, as no brain does; look at their unit",
+                       extent / 1e6);
+  return {};
+}
+
+std::string fault_of(const ContourStack& stack) {
+  if (const std::string fault = fault_of_numbers(stack); !fault.empty()) return fault;
   std::vector<std::string> faults(stack.sections.size());
   parallel_for(stack.sections.size(), 1, [&](std::size_t i) {
     const Section& section = stack.sections[i];

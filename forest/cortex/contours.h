@@ -52,8 +52,15 @@ struct ContourStack {
   friend bool operator==(const ContourStack&, const ContourStack&) = default;
 };
 
-/// What is wrong with contours, in one sentence that names object, section and place; empty when nothing is. Tested are
-/// that numbers are finite, sections ascend, and no contour of an object crosses itself or another one of it.
+inline constexpr double largest_brain =
+    1e6;  // µm: what reaches farther has another unit; a whale's is .3 m long
+
+/// What is wrong with the numbers of a stack, in one sentence; empty when nothing is. Tested are that they are finite, that sections
+/// ascend, and that no axis reaches farther than the largest brain. Takes no time, and what has another unit would take long.
+std::string fault_of_numbers(const ContourStack& stack);
+
+/// The same, and what is wrong with contours, with object, section and place: no contour of an object crosses itself or another
+/// one of it, and none is there twice. On all cores.
 std::string fault_of(const ContourStack& stack);
 
 /// How often contours of two objects cross, or of one and the same.
@@ -66,9 +73,6 @@ struct Crossings {
 /// Of all objects that do, also of different ones: there the tissue between the two has no thickness. By object, then by the
 /// other. On all cores.
 std::vector<Crossings> crossings(const ContourStack& stack);
-
-inline constexpr double largest_brain =
-    1e6;  // µm: what reaches farther has another unit; a whale's is .3 m long
 
 /// Where planes stand: at multiples of `spacing` (µm, > 0) moved by `offset`, all that lie within [low, high].
 std::vector<double> planes_between(double low, double high, double spacing, double offset = 0.);

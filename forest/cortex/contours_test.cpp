@@ -218,6 +218,17 @@ TEST(FaultOf, KnowsAContourThatIsThereTwiceAmongMany) {
   EXPECT_NE(fault_of(drawn(rows)).find("one contour twice"), std::string::npos) << fault_of(drawn(rows));
 }
 
+TEST(FaultOf, KnowsWhatReachesFartherThanABrain) {
+  const std::vector<Place> square{{0., 0.}, {4000., 0.}, {4000., 4000.}, {0., 4000.}};
+  auto large = square;
+  for (Place& p : large) p *= 1000.;
+  EXPECT_NE(fault_of(drawn({large})).find("spread over 4 m"), std::string::npos);
+  ContourStack apart = drawn({square});
+  apart.sections.push_back(apart.sections[0]);
+  apart.sections[1].at += 2e6;
+  EXPECT_NE(fault_of_numbers(apart).find("spread over 2 m"), std::string::npos) << fault_of_numbers(apart);
+}
+
 TEST(Crossings, AreCountedAlsoBetweenObjects) {
   const std::vector<Place> square{{0., 0.}, {4000., 0.}, {4000., 4000.}, {0., 4000.}};
   auto shifted = square;

@@ -87,9 +87,6 @@ Raster raster_of(const ContourStack& stack, const SurfaceOptions& options) {
     for (const Contour& contour : section.contours)
       for (const Place& point : contour.curve.points) low = low.cwiseMin(point), high = high.cwiseMax(point);
   if (!(low.x() <= high.x())) throw Error("the sections have no contours; trace some");
-  if (const double extent = (high - low).maxCoeff(); extent > largest_brain)
-    throw Error(
-        fmt::format("the contours spread over {:.3g} m, as no brain does; look at their unit", extent / 1e6));
   const double border = 2.5 * raster.step;
   raster.origin = low - Place::Constant(border);
   const auto points = [&](double extent) {
@@ -288,9 +285,9 @@ std::vector<float> signed_distances(const Section& section, std::uint32_t object
 Surfaces surfaces_from(const ContourStack& stack, const SurfaceOptions& options, Progress& progress) {
   const std::uint32_t outer_object = object_of(stack, options.outer),
                       inner_object = object_of(stack, options.inner);
-  const Raster raster = raster_of(stack, options);  // first of all, since it knows of wrong units
-  const std::string fault = fault_of(stack);
-  if (!fault.empty()) throw Error(fault);
+  if (const std::string fault = fault_of_numbers(stack); !fault.empty()) throw Error(fault);
+  const Raster raster = raster_of(stack, options);
+  if (const std::string fault = fault_of(stack); !fault.empty()) throw Error(fault);
   for (const std::uint32_t object : {outer_object, inner_object}) must_go_on(stack, object);
   ScalarGrid inner = interpolated(stack, inner_object, raster, progress);
   ScalarGrid outer = interpolated(stack, outer_object, raster, progress);

@@ -296,6 +296,12 @@ $BRAINFOREST cortex compare shifted.contours --json >shifted.json 2>told.txt
 grep -q "contours of 'outer' and 'inner' cross at 2 places in 1 section, first in section 6 (" told.txt
 told shifted.json 'd["crossings"][0]["objects"] == ["outer", "inner"] and d["crossings"][0]["places"] == 2 and d["crossings"][0]["sections"] == 1'
 
+# What has another unit is refused at once.
+sed 's/"unit": "um"/"unit": "mm"/' s.contours >mm.contours
+refuses 'look at their unit' $BRAINFOREST cortex contours mm.contours -o no.contours
+refuses 'look at their unit' $BRAINFOREST cortex compare mm.contours
+refuses 'look at their unit' $BRAINFOREST cortex surfaces mm.contours -o no.gii no2.gii
+
 # Contours that cross, and objects that were swapped.
 python3 - <<'PY2'
 import json
