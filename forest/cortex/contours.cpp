@@ -273,6 +273,27 @@ std::vector<Crossings> crossings(const ContourStack& stack) {
   return result;
 }
 
+ContourStack only(const ContourStack& stack, std::span<const std::string> objects) {
+  ContourStack result{.axis = stack.axis, .objects = {}, .sections = {}};
+  for (const std::string& object : objects)
+    if (std::ranges::find(stack.objects, object) == stack.objects.end())
+      throw Error(fmt::format("the contours have no object '{}'; name one of {}", object,
+                              fmt::join(stack.objects, ", ")));
+  constexpr auto none = ~std::uint32_t(0);
+  std::vector<std::uint32_t> now;  // its number, of each object
+  for (const std::string& object : stack.objects) {
+    const bool wanted = std::ranges::find(objects, object) != objects.end();
+    now.push_back(wanted ? std::uint32_t(result.objects.size()) : none);
+    if (wanted) result.objects.push_back(object);
+  }
+  for (const Section& section : stack.sections) {
+    Section& kept = result.sections.emplace_back(Section{section.at, {}});
+    for (const Contour& contour : section.contours)
+      if (now.at(contour.object) != none) kept.contours.push_back({now[contour.object], contour.curve});
+  }
+  return result;
+}
+
 Place flat(const Eigen::Vector3d& point, Axis axis) {
   const auto& axes = flat_axes(axis);
   return {point[axes[0]], point[axes[1]]};

@@ -74,6 +74,9 @@ struct Crossings {
 /// other. On all cores.
 std::vector<Crossings> crossings(const ContourStack& stack);
 
+/// All sections, and in them the contours of these objects alone. Throws Error for an object that the stack has not.
+ContourStack only(const ContourStack& stack, std::span<const std::string> objects);
+
 /// Where planes stand: at multiples of `spacing` (µm, > 0) moved by `offset`, all that lie within [low, high].
 std::vector<double> planes_between(double low, double high, double spacing, double offset = 0.);
 

@@ -229,6 +229,22 @@ TEST(FaultOf, KnowsWhatReachesFartherThanABrain) {
   EXPECT_NE(fault_of_numbers(apart).find("spread over 2 m"), std::string::npos) << fault_of_numbers(apart);
 }
 
+TEST(Only, KeepsObjectsThatAreNamedAndEverySection) {
+  const std::vector<Place> square{{0., 0.}, {4000., 0.}, {4000., 4000.}, {0., 4000.}};
+  ContourStack stack = drawn({square, square, square});
+  stack.objects = {"outer", "dendrite", "inner"};
+  stack.sections[0].contours[1].object = 1, stack.sections[0].contours[2].object = 2;
+  stack.sections.push_back({.at = 9e3, .contours = {stack.sections[0].contours[1]}});
+  const ContourStack two = only(stack, std::array<std::string, 2>{"inner", "outer"});
+  EXPECT_EQ(two.objects, (std::vector<std::string>{"outer", "inner"}));
+  ASSERT_EQ(two.sections.size(), 2u);
+  ASSERT_EQ(two.sections[0].contours.size(), 2u);
+  EXPECT_EQ(two.sections[0].contours[1].object, 1u);
+  EXPECT_TRUE(two.sections[1].contours.empty());
+  EXPECT_NE(refused([&] { (void)only(stack, std::array<std::string, 1>{"axon"}); }).find("'axon'"),
+            std::string::npos);
+}
+
 TEST(Crossings, AreCountedAlsoBetweenObjects) {
   const std::vector<Place> square{{0., 0.}, {4000., 0.}, {4000., 4000.}, {0., 4000.}};
   auto shifted = square;

@@ -2,6 +2,7 @@
 #include "forest/cortex/surfaces.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -17,11 +18,7 @@ namespace forest::cortex {
 namespace {
 
 std::uint32_t object_of(const ContourStack& stack, const std::string& name) {
-  const auto found = std::ranges::find(stack.objects, name);
-  if (found != stack.objects.end()) return std::uint32_t(found - stack.objects.begin());
-  std::string names;
-  for (const std::string& one : stack.objects) names += (names.empty() ? "" : ", ") + one;
-  throw Error(fmt::format("the contours have no object '{}'; name one of {}", name, names));
+  return std::uint32_t(std::ranges::find(stack.objects, name) - stack.objects.begin());
 }
 
 double distance_of_sections(const ContourStack& stack) {
@@ -282,7 +279,8 @@ std::vector<float> signed_distances(const Section& section, std::uint32_t object
   return squared;
 }
 
-Surfaces surfaces_from(const ContourStack& stack, const SurfaceOptions& options, Progress& progress) {
+Surfaces surfaces_from(const ContourStack& given, const SurfaceOptions& options, Progress& progress) {
+  const ContourStack stack = only(given, std::array{options.outer, options.inner});
   const std::uint32_t outer_object = object_of(stack, options.outer),
                       inner_object = object_of(stack, options.inner);
   if (const std::string fault = fault_of_numbers(stack); !fault.empty()) throw Error(fault);

@@ -146,6 +146,13 @@ TEST(SurfacesFrom, RefuseWhatCannotBeWithASentence) {
   EXPECT_EQ(sentence(good), "");
   EXPECT_NE(sentence(good, {.outer = "inner", .inner = "outer"}).find("outside"), std::string::npos);
   EXPECT_NE(sentence(good, {.outer = "pia"}).find("'pia'"), std::string::npos);
+  // What others there are is not looked at.
+  ContourStack more = good;
+  more.objects.push_back("dendrite");
+  for (Section& section : more.sections)
+    section.contours.push_back(
+        {2, straight_loop(std::array<Place, 4>{{{0., 0.}, {9e6, 9e6}, {9e6, 0.}, {0., 9e6}}})});
+  EXPECT_EQ(sentence(more), "");
   EXPECT_NE(sentence(good, {.voxel = 1.}).find("million points"), std::string::npos);
   ContourStack one_swapped = good;
   for (Contour& contour : one_swapped.sections[good.sections.size() / 2].contours) contour.object ^= 1u;

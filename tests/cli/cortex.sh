@@ -296,6 +296,15 @@ $BRAINFOREST cortex compare shifted.contours --json >shifted.json 2>told.txt
 grep -q "contours of 'outer' and 'inner' cross at 2 places in 1 section, first in section 6 (" told.txt
 told shifted.json 'd["crossings"][0]["objects"] == ["outer", "inner"] and d["crossings"][0]["places"] == 2 and d["crossings"][0]["sections"] == 1'
 
+# Of one boundary, nothing is told of others, nor drawn.
+$BRAINFOREST cortex compare shifted.contours --object inner --svg inner_alone --json >inner_alone.json 2>told.txt
+told inner_alone.json 'd["crossings"] == [] and {p["object"] for p in d["pairs"]} == {"inner"}'
+[ ! -s told.txt ] && grep -q inner inner_alone/section_0006.svg
+! grep -q outer inner_alone/section_0006.svg
+refuses "no object 'pia'; name one of outer, inner" $BRAINFOREST cortex compare shifted.contours --object pia
+$BRAINFOREST cortex contours shifted.contours --object inner -o inner_alone.contours >/dev/null
+grep -q '"objects": \["inner"\]' inner_alone.contours
+
 # What has another unit is refused at once.
 sed 's/"unit": "um"/"unit": "mm"/' s.contours >mm.contours
 refuses 'look at their unit' $BRAINFOREST cortex contours mm.contours -o no.contours
