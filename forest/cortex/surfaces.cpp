@@ -195,6 +195,30 @@ void must_be_nested(const ScalarGrid& inner, const ScalarGrid& outer, const Cont
   }
 }
 
+// How much of what lies within one lies outside of the other, and has it on all four sides in its section: in its holes, or in
+// bays of it that are nearly closed.
+std::size_t surrounded(const ScalarGrid& one, const ScalarGrid& other) {
+  const auto [width, height, layers] = other.size;
+  std::size_t count = 0;
+  for (std::size_t z = 0; z < layers; ++z) {
+    const std::size_t first = z * width * height;
+    // Where it begins and ends in each column and, in turn, each row.
+    std::vector<std::size_t> low(width, height), high(width, 0);
+    for (std::size_t i = 0; i < width * height; ++i)
+      if (other.values[first + i] < 0.f)
+        low[i % width] = std::min(low[i % width], i / width), high[i % width] = i / width;
+    for (std::size_t y = 0; y < height; ++y) {
+      const float* row = &other.values[first + y * width];
+      std::size_t left = 0, right = width;
+      while (left < width && row[left] >= 0.f) ++left;
+      while (right > left && row[right - 1] >= 0.f) --right;
+      for (std::size_t x = left; x < right; ++x)
+        count += one.values[first + y * width + x] < 0.f && row[x] >= 0.f && low[x] < y && y < high[x];
+    }
+  }
+  return count;
+}
+
 Unjoined unjoined(std::vector<std::size_t> before, const std::vector<std::size_t>& after,
                   const Raster& raster) {
   std::vector<std::size_t> lost(before.size());
@@ -295,6 +319,12 @@ Surfaces surfaces_from(const ContourStack& given, const SurfaceOptions& options,
   std::size_t nested = 0, outside = 0;
   for (std::size_t i = 0; i < inner.count(); ++i)
     if (inner.values[i] < 0.f) ++(outer.values[i] < 0.f ? nested : outside);
+  constexpr double nearly_all = .8;
+  if (const double holes = double(surrounded(inner, outer)) / double(nested + outside); holes > nearly_all)
+    throw Error(
+        fmt::format("{:.0f} % of what lies within '{}' lies in holes of '{}'; the outer boundary must hold "
+                    "grey and white matter together",
+                    100. * holes, options.inner, options.outer));
   if (outside > nested / 4)
     throw Error(fmt::format(
         "{:.0f} % of what lies within '{}' lies outside '{}'; swap them or give contours of one brain",

@@ -154,6 +154,20 @@ TEST(SurfacesFrom, RefuseWhatCannotBeWithASentence) {
         {2, straight_loop(std::array<Place, 4>{{{0., 0.}, {9e6, 9e6}, {9e6, 0.}, {0., 9e6}}})});
   EXPECT_EQ(sentence(more), "");
   EXPECT_NE(sentence(good, {.voxel = 1.}).find("million points"), std::string::npos);
+  // Grey matter alone, with the white matter in its holes.
+  ContourStack grey = good;
+  for (Section& section : grey.sections)
+    for (std::size_t i = 0, count = section.contours.size(); i < count; ++i)
+      if (section.contours[i].object == 1) {
+        Contour hole = section.contours[i];
+        hole.object = 0;
+        std::ranges::reverse(hole.curve.points);
+        std::ranges::rotate(hole.curve.points, hole.curve.points.end() - 1);
+        section.contours.push_back(hole);
+      }
+  EXPECT_NE(sentence(grey).find("in holes of 'outer'; the outer boundary must hold grey and white matter"),
+            std::string::npos)
+      << sentence(grey);
   ContourStack one_swapped = good;
   for (Contour& contour : one_swapped.sections[good.sections.size() / 2].contours) contour.object ^= 1u;
   EXPECT_NE(sentence(one_swapped).find("exchange them there"), std::string::npos) << sentence(one_swapped);
