@@ -2,11 +2,11 @@
 // brainforest cortex contours and cortex compare: sections of surfaces, volumes and pictures as curves, and how successive
 // ones differ.
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <compare>
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -79,7 +79,7 @@ struct Used {
 struct Options {
   CLI::App* command = nullptr;
   std::vector<fs::path> inputs;
-  std::vector<std::string> names;
+  std::vector<std::string> names, objects;
   fs::path out;
   std::string axis = "y";
   double spacing = 1., offset = 0., threshold = NAN, pixel = 0., tolerance = .02, unit = 1.;
@@ -246,32 +246,20 @@ cortex::ContourStack of_volume(const cortex::Volume& volume, const fs::path& pat
 
 // Where contours cross: one sentence for each two boundaries, and how often as a list.
 nlohmann::ordered_json tell_crossings(const cortex::ContourStack& stack, Console& console) {
-  struct Two {
-    std::size_t count = 0, sections = 0;
-    cortex::ContourCrossing first, last;
-  };
-  std::map<std::pair<std::uint32_t, std::uint32_t>, Two> twos;
-  for (const cortex::ContourCrossing& crossing : cortex::crossings(stack)) {
-    Two& two = twos[{crossing.object, crossing.other}];
-    if (!two.count) two.first = crossing;
-    two.sections += !two.count || two.last.section != crossing.section;
-    ++two.count, two.last = crossing;
-  }
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const auto& [objects, two] : twos) {
-    const std::string &one = stack.objects[objects.first], &other = stack.objects[objects.second];
-    const double at = stack.sections[two.first.section].at / 1e3, x = two.first.place.x() / 1e3,
-                 y = two.first.place.y() / 1e3;
+  for (const cortex::Crossings& two : cortex::crossings(stack)) {
+    const std::string &one = stack.objects[two.object], &other = stack.objects[two.other];
+    const double at = stack.sections[two.section].at / 1e3, x = two.place.x() / 1e3, y = two.place.y() / 1e3;
     list.push_back({{"objects", {one, other}},
-                    {"places", two.count},
+                    {"places", two.places},
                     {"sections", two.sections},
                     {"first", {{"at", at}, {"place", {x, y}}}}});
     console.warn(
         fmt::format("{} cross at {} in {}, first in section {} ({:.6g} mm) at ({:.6g}, {:.6g}) mm; {}",
                     one == other ? fmt::format("contours of '{}'", one)
                                  : fmt::format("contours of '{}' and '{}'", one, other),
-                    counted(two.count, "place"), counted(two.sections, "section"), two.first.section + 1, at,
-                    x, y, one == other ? "draw them apart" : "there is no tissue between them there"));
+                    counted(two.places, "place"), counted(two.sections, "section"), two.section + 1, at, x, y,
+                    one == other ? "draw them apart" : "there is no tissue between them there"));
   }
   return list;
 }
@@ -384,6 +372,7 @@ void run(const Options& options, Console& console) {
   for (std::size_t i = 0; i < surfaces.size(); ++i)
     stacks.push_back(cut(surfaces[i], surface_names[i], surface_files[i], axis, planes));
   cortex::ContourStack stack = cortex::together(stacks);
+  if (!options.objects.empty()) stack = cortex::only(stack, options.objects);
   const std::string fault = cortex::fault_of(stack);
   if (!fault.empty()) throw Error(options.inputs.front().string() + ": " + fault);
   cortex::FitSummary summary;
@@ -444,6 +433,8 @@ std::function<void()> cortex_contours(CLI::App& command, Console& console) {
       ->type_name("FILE");
   command.add_option("--name", o->names, "What the boundaries are called, in the order of the files")
       ->type_name("NAME");
+  command.add_option("--object", o->objects, "Keep only these boundaries, of a file with many")
+      ->type_name("NAME");
   command.add_option("--axis", o->axis, "Across the sections: x sagittal, y coronal, z horizontal")
       ->capture_default_str()
       ->check(CLI::IsMember({"x", "y", "z"}));
@@ -490,13 +481,13 @@ std::function<void()> cortex_compare(CLI::App& command, Console& console) {
     must_not_be_read("--svg", o->svg, {o->file});
     must_be_used(command,
                  {{"--unit", "of an .slc file, and none is given", extension_of(o->file) == ".slc"}});
-    const cortex::ContourStack stack = read_contour_files(o->file, 1e3 * o->unit, console);
+    cortex::ContourStack stack = read_contour_files(o->file, 1e3 * o->unit, console);
     if (stack.sections.size() < 2)
       throw Error(fmt::format("{}: has {}; two are compared", o->file.string(),
                               counted(stack.sections.size(), "section")));
-    if (!o->object.empty() && std::ranges::find(stack.objects, o->object) == stack.objects.end())
-      throw Error(fmt::format("{}: has no object '{}'; it has {}", o->file.string(), o->object,
-                              fmt::join(stack.objects, ", ")));
+    if (!o->object.empty()) stack = cortex::only(stack, std::array{o->object});
+    if (const std::string fault = cortex::fault_of_numbers(stack); !fault.empty())
+      throw Error(o->file.string() + ": " + fault);
     nlohmann::ordered_json rows = nlohmann::ordered_json::array();
     std::vector<std::vector<std::string>> table;
     const auto mm = [](double um) {
@@ -506,7 +497,6 @@ std::function<void()> cortex_compare(CLI::App& command, Console& console) {
     };
     for (const cortex::SectionChange& change : cortex::changes(stack, console.progress())) {
       const std::string& name = stack.objects[change.object];
-      if (!o->object.empty() && name != o->object) continue;
       const double from = stack.sections[change.section].at / 1e3,
                    to = stack.sections[change.section + 1].at / 1e3;
       rows.push_back({{"from", from},

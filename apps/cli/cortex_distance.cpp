@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest cortex distance: how far two surfaces are from one another.
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -67,7 +68,8 @@ void run(const Options& o, Console& console) {
   for (const bool vertices : {false, true})
     for (const std::size_t from : {0u, 1u}) {
       const std::size_t to = 1 - from;
-      const auto places = vertices ? at_vertices(meshes[from]) : evenly_on(meshes[from]);
+      const double share = area_each(meshes[from]);
+      const auto places = vertices ? at_vertices(meshes[from]) : evenly_on(meshes[from], share);
       const Distances d = distances(places, trees[to]);
       if (vertices && from == 0 && !o.values.empty()) {
         std::vector<double> mm;
@@ -78,6 +80,7 @@ void run(const Options& o, Console& console) {
       out.push_back({{"from", names[from]},
                      {"to", names[to]},
                      {"places", vertices ? "vertices" : "evenly"},
+                     {"each", vertices ? NAN : share / 1e6},
                      {"count", places.size()},
                      {"mean", d.mean / 1e3},
                      {"median", d.median / 1e3},
@@ -85,7 +88,10 @@ void run(const Options& o, Console& console) {
                      {"greatest", d.greatest / 1e3},
                      {"farthest", {d.farthest.x() / 1e3, d.farthest.y() / 1e3, d.farthest.z() / 1e3}}});
       table.push_back({fmt::format("{} → {}", names[from], names[to]),
-                       vertices ? "at its vertices" : "evenly, a place each .25 mm²",
+                       vertices ? "at its vertices"
+                       : share == usual_area_each
+                           ? "evenly, a place each .25 mm²"
+                           : fmt::format("evenly, a place each {:.3g} mm²", share / 1e6),
                        fmt::format("{}", places.size()), mm(d.mean), mm(d.median), mm(d.p95), mm(d.greatest),
                        fmt::format("{:.1f} {:.1f} {:.1f}", d.farthest.x() / 1e3, d.farthest.y() / 1e3,
                                    d.farthest.z() / 1e3)});

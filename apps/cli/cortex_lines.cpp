@@ -143,9 +143,11 @@ void run(const Options& o, Console& console) {
     throw Error("borders are drawn on the vertices of the outer surface; leave --level out");
   must_take_files({o.out, o.sheet, o.values}, o.force);
   if (!o.sheet.empty()) must_take_surfaces({o.sheet}, o.force);
+  std::vector<fs::path> read{o.outer, o.inner};
+  read.insert(read.end(), o.borders.begin(), o.borders.end());
   for (const auto& [option, path] :
        {std::pair{"--out", o.out}, std::pair{"--sheet", o.sheet}, std::pair{"--values", o.values}})
-    must_not_be_read(option, path, {o.outer, o.inner});
+    must_not_be_read(option, path, read);
   const Mesh outer = read_mesh(o.outer), inner = read_mesh(o.inner);
   for (const std::string& oddity : cortex::check_surfaces(outer, inner)) console.warn(oddity);
 

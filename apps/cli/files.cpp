@@ -228,10 +228,19 @@ void must_take_surfaces(const std::vector<fs::path>& files, bool force) {
 }
 
 void must_not_be_read(const char* option, const fs::path& written, const std::vector<fs::path>& read) {
-  for (const fs::path& file : read)
-    if (std::error_code none; fs::equivalent(written, file, none))
+  std::error_code none;
+  for (const fs::path& file : read) {
+    if (fs::equivalent(written, file, none))
       throw Error(fmt::format("{} is what is read here, so it is not replaced; give {} another name",
                               repository::escaped(written.string()), option));
+    // A link may lie in one folder and what it leads to in another.
+    const fs::path folder = fs::canonical(fs::absolute(file, none).parent_path(), none);
+    for (fs::path above : {folder, fs::canonical(file, none).parent_path()})
+      for (; !above.empty(); above = above.has_relative_path() ? above.parent_path() : fs::path())
+        if (fs::equivalent(written, above, none))
+          throw Error(fmt::format("{} holds what is read here, so it is not replaced; give {} another name",
+                                  repository::escaped(written.string()), option));
+  }
 }
 
 void refuse_existing(const std::vector<fs::path>& files) {

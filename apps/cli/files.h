@@ -62,7 +62,7 @@ std::string extension_of(const std::filesystem::path& path);
 void must_take_files(const std::vector<std::filesystem::path>& files, bool force);
 /// The same for a surface, which io::write_surface writes: names of other formats than its are refused.
 void must_take_surfaces(const std::vector<std::filesystem::path>& files, bool force);
-/// Throws Error when what an option says to write is one of the files that are read, by whatever name.
+/// Throws Error when what an option says to write is one of the files that are read, by whatever name, or a folder that holds one.
 void must_not_be_read(const char* option, const std::filesystem::path& written,
                       const std::vector<std::filesystem::path>& read);
 /// Throws Error when the folder of something new is missing or cannot be written.

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <tuple>
 #include <unordered_map>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -84,6 +86,13 @@ std::vector<Contour> cut_one(const Mesh& surface, Axis axis, double at,
   return contours;
 }
 
+// Which contours of a section an object has, of those that have some.
+std::map<std::uint32_t, std::vector<std::size_t>> of_objects(const Section& section) {
+  std::map<std::uint32_t, std::vector<std::size_t>> found;
+  for (std::size_t i = 0; i < section.contours.size(); ++i) found[section.contours[i].object].push_back(i);
+  return found;
+}
+
 constexpr double fine = .2;  // µm: so near are polygons to curves where it is asked what crosses
 
 // Where two edges of a section's polygons cross that share no end.
@@ -91,9 +100,9 @@ struct Crossing {
   Place place;
   std::size_t first, second;  // contours
 };
-std::vector<Crossing> crossings_in(std::span<const std::vector<Place>> polygons,
-                                   std::size_t most = ~std::size_t(0)) {
-  std::vector<Crossing> found;
+// Shows each, from left to right about, until `see` returns false.
+template <class See>
+void each_crossing(std::span<const std::vector<Place>> polygons, See see) {
   struct Side {
     Place a, b;
     std::size_t polygon, index;
@@ -119,18 +128,29 @@ std::vector<Crossing> crossings_in(std::span<const std::vector<Place>> polygons,
       const Place u = one.b - one.a, v = other.b - other.a;
       const double a = cross(u, other.a - one.a), b = cross(u, other.b - one.a);
       const double c = cross(v, one.a - other.a), d = cross(v, one.b - other.a);
-      if (a * b < 0. && c * d < 0.)
-        found.push_back({one.a + c / (c - d) * u, std::min(one.polygon, other.polygon),
-                         std::max(one.polygon, other.polygon)});
-      if (found.size() == most) return found;
+      if (a * b < 0. && c * d < 0. &&
+          !see(Crossing{one.a + c / (c - d) * u, std::min(one.polygon, other.polygon),
+                        std::max(one.polygon, other.polygon)}))
+        return;
     }
     open.push_back(k);
   }
+}
+std::vector<Crossing> crossings_in(std::span<const std::vector<Place>> polygons) {
+  std::vector<Crossing> found;
+  each_crossing(polygons, [&](const Crossing& crossing) {
+    found.push_back(crossing);
+    return true;
+  });
   return found;
 }
 std::optional<Crossing> crossing_in(std::span<const std::vector<Place>> polygons) {
-  const auto found = crossings_in(polygons, 1);
-  return found.empty() ? std::nullopt : std::optional(found.front());
+  std::optional<Crossing> found;
+  each_crossing(polygons, [&](const Crossing& crossing) {
+    found = crossing;
+    return false;
+  });
+  return found;
 }
 
 }  // namespace
@@ -143,6 +163,7 @@ std::optional<Place> twin_in(const std::vector<std::vector<Place>>& polygons) {
   struct Shape {
     double area;
     Place middle;
+    double along;  // askew, since those of pixels lie in rows and columns
   };
   std::vector<Shape> shapes;
   for (const auto& polygon : polygons) {
@@ -154,19 +175,23 @@ std::optional<Place> twin_in(const std::vector<std::vector<Place>>& polygons) {
       twice += part, middle += part / 3. * (a + b);
     }
     if (twice == 0.) continue;
-    const Shape shape{std::abs(twice) / 2., polygon[0] + middle / twice};
-    for (const Shape& other : shapes)
-      if (std::abs(shape.area - other.area) < same * shape.area &&
-          (shape.middle - other.middle).norm() < same * std::sqrt(shape.area))
-        return shape.middle;
-    shapes.push_back(shape);
+    const Place at = polygon[0] + middle / twice;
+    shapes.push_back({std::abs(twice) / 2., at, at.dot(Place(std::cos(1.), std::sin(1.)))});
   }
+  std::ranges::stable_sort(shapes, {}, &Shape::along);
+  for (auto one = shapes.begin(); one != shapes.end(); ++one)
+    for (auto next = one + 1; next != shapes.end() && next->along - one->along < same * std::sqrt(one->area);
+         ++next)
+      if (std::abs(one->area - next->area) < same * one->area &&
+          (one->middle - next->middle).norm() < same * std::sqrt(one->area))
+        return one->middle;
   return std::nullopt;
 }
 
 }  // namespace
 
-std::string fault_of(const ContourStack& stack) {
+std::string fault_of_numbers(const ContourStack& stack) {
+  Place low = Place::Constant(HUGE_VAL), high = -low;
   for (std::size_t i = 0; i < stack.sections.size(); ++i) {
     const Section& section = stack.sections[i];
     if (!std::isfinite(section.at)) return fmt::format("section {} is at no number; say where it is", i + 1);
@@ -185,15 +210,26 @@ std::string fault_of(const ContourStack& stack) {
               "a contour of '{}' in section {} ({:.6g} mm) has a coordinate that is no number; trace "
               "it again",
               object, i + 1, section.at / 1e3);
+      for (const Place& point : contour.curve.points) low = low.cwiseMin(point), high = high.cwiseMax(point);
     }
   }
+  double extent = stack.sections.empty() ? 0. : stack.sections.back().at - stack.sections.front().at;
+  if (low.x() <= high.x()) extent = std::max(extent, (high - low).maxCoeff());
+  if (extent > largest_brain)
+    return fmt::format("the contours spread over {:.3g} m, as no brain does; look at their unit",
+                       extent / 1e6);
+  return {};
+}
+
+std::string fault_of(const ContourStack& stack) {
+  if (const std::string fault = fault_of_numbers(stack); !fault.empty()) return fault;
   std::vector<std::string> faults(stack.sections.size());
   parallel_for(stack.sections.size(), 1, [&](std::size_t i) {
     const Section& section = stack.sections[i];
-    for (std::uint32_t object = 0; object < stack.objects.size() && faults[i].empty(); ++object) {
+    for (const auto& [object, who] : of_objects(section)) {
+      if (!faults[i].empty()) break;
       std::vector<std::vector<Place>> polygons;
-      for (const Contour& contour : section.contours)
-        if (contour.object == object) polygons.push_back(flattened(contour.curve, fine));
+      for (const std::size_t c : who) polygons.push_back(flattened(section.contours[c].curve, fine));
       if (const auto twin = twin_in(polygons))
         faults[i] = fmt::format(
             "'{}' has one contour twice in section {} ({:.6g} mm), by ({:.6g}, {:.6g}) mm; leave "
@@ -212,22 +248,50 @@ std::string fault_of(const ContourStack& stack) {
   return {};
 }
 
-std::vector<ContourCrossing> crossings(const ContourStack& stack) {
-  std::vector<std::vector<ContourCrossing>> of_section(stack.sections.size());
+std::vector<Crossings> crossings(const ContourStack& stack) {
+  using Two = std::pair<std::uint32_t, std::uint32_t>;
+  std::vector<std::map<Two, Crossings>> of_section(stack.sections.size());
   parallel_for(stack.sections.size(), 1, [&](std::size_t i) {
     const Section& section = stack.sections[i];
     std::vector<std::vector<Place>> polygons;
     for (const Contour& contour : section.contours) polygons.push_back(flattened(contour.curve, fine));
-    for (const Crossing& crossing : crossings_in(polygons)) {
-      const auto [object, other] =
+    each_crossing(polygons, [&](const Crossing& crossing) {
+      const Two two =
           std::minmax(section.contours[crossing.first].object, section.contours[crossing.second].object);
-      of_section[i].push_back({i, object, other, crossing.place});
-    }
-    std::ranges::stable_sort(of_section[i], {}, [](const auto& c) { return c.place.x(); });
+      Crossings& here = of_section[i].try_emplace(two, two.first, two.second, 0u, 1u, i).first->second;
+      if (here.places++ == 0 || crossing.place.x() < here.place.x()) here.place = crossing.place;
+      return true;
+    });
   });
-  std::vector<ContourCrossing> all;
-  for (const auto& some : of_section) all.insert(all.end(), some.begin(), some.end());
-  return all;
+  std::map<Two, Crossings> all;
+  for (const auto& some : of_section)
+    for (const auto& [two, here] : some)
+      if (const auto [there, first] = all.emplace(two, here); !first)
+        there->second.places += here.places, ++there->second.sections;
+  std::vector<Crossings> result;
+  for (const auto& [two, one] : all) result.push_back(one);
+  return result;
+}
+
+ContourStack only(const ContourStack& stack, std::span<const std::string> objects) {
+  ContourStack result{.axis = stack.axis, .objects = {}, .sections = {}};
+  for (const std::string& object : objects)
+    if (std::ranges::find(stack.objects, object) == stack.objects.end())
+      throw Error(fmt::format("the contours have no object '{}'; name one of {}", object,
+                              fmt::join(stack.objects, ", ")));
+  constexpr auto none = ~std::uint32_t(0);
+  std::vector<std::uint32_t> now;  // its number, of each object
+  for (const std::string& object : stack.objects) {
+    const bool wanted = std::ranges::find(objects, object) != objects.end();
+    now.push_back(wanted ? std::uint32_t(result.objects.size()) : none);
+    if (wanted) result.objects.push_back(object);
+  }
+  for (const Section& section : stack.sections) {
+    Section& kept = result.sections.emplace_back(Section{section.at, {}});
+    for (const Contour& contour : section.contours)
+      if (now.at(contour.object) != none) kept.contours.push_back({now[contour.object], contour.curve});
+  }
+  return result;
 }
 
 Place flat(const Eigen::Vector3d& point, Axis axis) {
@@ -357,10 +421,8 @@ ContourStack fitted(const ContourStack& stack, const FitOptions& options, FitSum
   progress.begin("parting curves", result.sections.size());
   parallel_for(result.sections.size(), 1, [&](std::size_t k) {
     const Section& section = result.sections[k];
-    for (std::uint32_t object = 0; object < stack.objects.size(); ++object) {
-      std::vector<std::size_t> who;
-      for (std::size_t i = 0; i < section.contours.size(); ++i)
-        if (section.contours[i].object == object) who.push_back(first_of[k] + i);
+    for (auto& [object, who] : of_objects(section)) {
+      for (std::size_t& i : who) i += first_of[k];
       std::vector<Emphasis> closer;
       std::vector<bool> kept(who.size());
       for (std::size_t i = 0; i < who.size(); ++i) kept[i] = !given[who[i]].polygon();

@@ -52,22 +52,30 @@ struct ContourStack {
   friend bool operator==(const ContourStack&, const ContourStack&) = default;
 };
 
-/// What is wrong with contours, in one sentence that names object, section and place; empty when nothing is. Tested are
-/// that numbers are finite, sections ascend, and no contour of an object crosses itself or another one of it.
-std::string fault_of(const ContourStack& stack);
-
-/// A place where two contours of a section cross, or one itself.
-struct ContourCrossing {
-  std::size_t section = 0;
-  std::uint32_t object = 0, other = 0;  // object <= other
-  Place place = Place::Zero();          // µm, in the section
-};
-/// All of them, also those of different objects: there the tissue between the two has no thickness. By sections, then by place
-/// from left to right. On all cores.
-std::vector<ContourCrossing> crossings(const ContourStack& stack);
-
 inline constexpr double largest_brain =
     1e6;  // µm: what reaches farther has another unit; a whale's is .3 m long
+
+/// What is wrong with the numbers of a stack, in one sentence; empty when nothing is. Tested are that they are finite, that sections
+/// ascend, and that no axis reaches farther than the largest brain. Takes no time, and what has another unit would take long.
+std::string fault_of_numbers(const ContourStack& stack);
+
+/// The same, and what is wrong with contours, with object, section and place: no contour of an object crosses itself or another
+/// one of it, and none is there twice. On all cores.
+std::string fault_of(const ContourStack& stack);
+
+/// How often contours of two objects cross, or of one and the same.
+struct Crossings {
+  std::uint32_t object = 0, other = 0;  // object <= other
+  std::size_t places = 0, sections = 0;
+  std::size_t section = 0;      // the first
+  Place place = Place::Zero();  // µm, in that section the leftmost
+};
+/// Of all objects that do, also of different ones: there the tissue between the two has no thickness. By object, then by the
+/// other. On all cores.
+std::vector<Crossings> crossings(const ContourStack& stack);
+
+/// All sections, and in them the contours of these objects alone. Throws Error for an object that the stack has not.
+ContourStack only(const ContourStack& stack, std::span<const std::string> objects);
 
 /// Where planes stand: at multiples of `spacing` (µm, > 0) moved by `offset`, all that lie within [low, high].
 std::vector<double> planes_between(double low, double high, double spacing, double offset = 0.);

@@ -207,7 +207,45 @@ TEST(FaultOf, NamesThePlaceWhereContoursCross) {
   EXPECT_NE(fault_of(broken), "");
 }
 
-TEST(Crossings, AreAllToldAlsoBetweenObjects) {
+TEST(FaultOf, KnowsAContourThatIsThereTwiceAmongMany) {
+  std::vector<std::vector<Place>> rows;
+  for (int i = 0; i < 400; ++i) {
+    const Place at(10. * (i % 20), 10. * (i / 20));
+    rows.push_back({at, at + Place(5., 0.), at + Place(5., 5.), at + Place(0., 5. + .01 * i)});
+  }
+  EXPECT_EQ(fault_of(drawn(rows)), "");
+  rows.push_back({rows[217].rbegin(), rows[217].rend()});
+  EXPECT_NE(fault_of(drawn(rows)).find("one contour twice"), std::string::npos) << fault_of(drawn(rows));
+}
+
+TEST(FaultOf, KnowsWhatReachesFartherThanABrain) {
+  const std::vector<Place> square{{0., 0.}, {4000., 0.}, {4000., 4000.}, {0., 4000.}};
+  auto large = square;
+  for (Place& p : large) p *= 1000.;
+  EXPECT_NE(fault_of(drawn({large})).find("spread over 4 m"), std::string::npos);
+  ContourStack apart = drawn({square});
+  apart.sections.push_back(apart.sections[0]);
+  apart.sections[1].at += 2e6;
+  EXPECT_NE(fault_of_numbers(apart).find("spread over 2 m"), std::string::npos) << fault_of_numbers(apart);
+}
+
+TEST(Only, KeepsObjectsThatAreNamedAndEverySection) {
+  const std::vector<Place> square{{0., 0.}, {4000., 0.}, {4000., 4000.}, {0., 4000.}};
+  ContourStack stack = drawn({square, square, square});
+  stack.objects = {"outer", "dendrite", "inner"};
+  stack.sections[0].contours[1].object = 1, stack.sections[0].contours[2].object = 2;
+  stack.sections.push_back({.at = 9e3, .contours = {stack.sections[0].contours[1]}});
+  const ContourStack two = only(stack, std::array<std::string, 2>{"inner", "outer"});
+  EXPECT_EQ(two.objects, (std::vector<std::string>{"outer", "inner"}));
+  ASSERT_EQ(two.sections.size(), 2u);
+  ASSERT_EQ(two.sections[0].contours.size(), 2u);
+  EXPECT_EQ(two.sections[0].contours[1].object, 1u);
+  EXPECT_TRUE(two.sections[1].contours.empty());
+  EXPECT_NE(refused([&] { (void)only(stack, std::array<std::string, 1>{"axon"}); }).find("'axon'"),
+            std::string::npos);
+}
+
+TEST(Crossings, AreCountedAlsoBetweenObjects) {
   const std::vector<Place> square{{0., 0.}, {4000., 0.}, {4000., 4000.}, {0., 4000.}};
   auto shifted = square;
   for (Place& p : shifted) p += Place(2000., 1000.);
@@ -216,21 +254,24 @@ TEST(Crossings, AreAllToldAlsoBetweenObjects) {
   stack.sections.insert(stack.sections.begin(),
                         Section{.at = 0., .contours = {stack.sections[0].contours[0]}});
   auto found = crossings(stack);
-  ASSERT_EQ(found.size(), 2u);
-  for (const auto& crossing : found) {
-    EXPECT_EQ(crossing.section, 1u);
-    EXPECT_EQ(crossing.object, 0u);
-    EXPECT_EQ(crossing.other, 0u);
-  }
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].section, 1u);
+  EXPECT_EQ(found[0].object, 0u);
+  EXPECT_EQ(found[0].other, 0u);
+  EXPECT_EQ(found[0].places, 2u);
   EXPECT_EQ(found[0].place, Place(2000., 4000.));
-  EXPECT_EQ(found[1].place, Place(4000., 1000.));
   // An inner contour that leaves the outer one is no fault of either, and told.
   stack.sections[1].contours[1].object = 1;
+  stack.sections.push_back(stack.sections[1]);
+  stack.sections[2].at += 1000.;
   EXPECT_EQ(fault_of(stack), "");
   found = crossings(stack);
-  ASSERT_EQ(found.size(), 2u);
+  ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].object, 0u);
   EXPECT_EQ(found[0].other, 1u);
+  EXPECT_EQ(found[0].places, 4u);
+  EXPECT_EQ(found[0].sections, 2u);
+  stack.sections.pop_back();
   for (Place& p : shifted) p = Place(1000., 1000.) + .25 * p;
   stack.sections[1].contours[1].curve = straight_loop(shifted);
   EXPECT_TRUE(crossings(stack).empty());

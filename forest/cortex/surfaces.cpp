@@ -2,6 +2,7 @@
 #include "forest/cortex/surfaces.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -17,11 +18,7 @@ namespace forest::cortex {
 namespace {
 
 std::uint32_t object_of(const ContourStack& stack, const std::string& name) {
-  const auto found = std::ranges::find(stack.objects, name);
-  if (found != stack.objects.end()) return std::uint32_t(found - stack.objects.begin());
-  std::string names;
-  for (const std::string& one : stack.objects) names += (names.empty() ? "" : ", ") + one;
-  throw Error(fmt::format("the contours have no object '{}'; name one of {}", name, names));
+  return std::uint32_t(std::ranges::find(stack.objects, name) - stack.objects.begin());
 }
 
 double distance_of_sections(const ContourStack& stack) {
@@ -87,9 +84,6 @@ Raster raster_of(const ContourStack& stack, const SurfaceOptions& options) {
     for (const Contour& contour : section.contours)
       for (const Place& point : contour.curve.points) low = low.cwiseMin(point), high = high.cwiseMax(point);
   if (!(low.x() <= high.x())) throw Error("the sections have no contours; trace some");
-  if (const double extent = (high - low).maxCoeff(); extent > largest_brain)
-    throw Error(
-        fmt::format("the contours spread over {:.3g} m, as no brain does; look at their unit", extent / 1e6));
   const double border = 2.5 * raster.step;
   raster.origin = low - Place::Constant(border);
   const auto points = [&](double extent) {
@@ -201,6 +195,30 @@ void must_be_nested(const ScalarGrid& inner, const ScalarGrid& outer, const Cont
   }
 }
 
+// How much of what lies within one lies outside of the other, and has it on all four sides in its section: in its holes, or in
+// bays of it that are nearly closed.
+std::size_t surrounded(const ScalarGrid& one, const ScalarGrid& other) {
+  const auto [width, height, layers] = other.size;
+  std::size_t count = 0;
+  for (std::size_t z = 0; z < layers; ++z) {
+    const std::size_t first = z * width * height;
+    // Where it begins and ends in each column and, in turn, each row.
+    std::vector<std::size_t> low(width, height), high(width, 0);
+    for (std::size_t i = 0; i < width * height; ++i)
+      if (other.values[first + i] < 0.f)
+        low[i % width] = std::min(low[i % width], i / width), high[i % width] = i / width;
+    for (std::size_t y = 0; y < height; ++y) {
+      const float* row = &other.values[first + y * width];
+      std::size_t left = 0, right = width;
+      while (left < width && row[left] >= 0.f) ++left;
+      while (right > left && row[right - 1] >= 0.f) --right;
+      for (std::size_t x = left; x < right; ++x)
+        count += one.values[first + y * width + x] < 0.f && row[x] >= 0.f && low[x] < y && y < high[x];
+    }
+  }
+  return count;
+}
+
 Unjoined unjoined(std::vector<std::size_t> before, const std::vector<std::size_t>& after,
                   const Raster& raster) {
   std::vector<std::size_t> lost(before.size());
@@ -285,12 +303,13 @@ std::vector<float> signed_distances(const Section& section, std::uint32_t object
   return squared;
 }
 
-Surfaces surfaces_from(const ContourStack& stack, const SurfaceOptions& options, Progress& progress) {
+Surfaces surfaces_from(const ContourStack& given, const SurfaceOptions& options, Progress& progress) {
+  const ContourStack stack = only(given, std::array{options.outer, options.inner});
   const std::uint32_t outer_object = object_of(stack, options.outer),
                       inner_object = object_of(stack, options.inner);
-  const Raster raster = raster_of(stack, options);  // first of all, since it knows of wrong units
-  const std::string fault = fault_of(stack);
-  if (!fault.empty()) throw Error(fault);
+  if (const std::string fault = fault_of_numbers(stack); !fault.empty()) throw Error(fault);
+  const Raster raster = raster_of(stack, options);
+  if (const std::string fault = fault_of(stack); !fault.empty()) throw Error(fault);
   for (const std::uint32_t object : {outer_object, inner_object}) must_go_on(stack, object);
   ScalarGrid inner = interpolated(stack, inner_object, raster, progress);
   ScalarGrid outer = interpolated(stack, outer_object, raster, progress);
@@ -300,6 +319,12 @@ Surfaces surfaces_from(const ContourStack& stack, const SurfaceOptions& options,
   std::size_t nested = 0, outside = 0;
   for (std::size_t i = 0; i < inner.count(); ++i)
     if (inner.values[i] < 0.f) ++(outer.values[i] < 0.f ? nested : outside);
+  constexpr double nearly_all = .8;
+  if (const double holes = double(surrounded(inner, outer)) / double(nested + outside); holes > nearly_all)
+    throw Error(
+        fmt::format("{:.0f} % of what lies within '{}' lies in holes of '{}'; the outer boundary must hold "
+                    "grey and white matter together",
+                    100. * holes, options.inner, options.outer));
   if (outside > nested / 4)
     throw Error(fmt::format(
         "{:.0f} % of what lies within '{}' lies outside '{}'; swap them or give contours of one brain",

@@ -39,10 +39,10 @@ struct Surfaces {
   std::size_t triangles = 0;  // of both, before they were made fewer
 };
 
-/// @param stack  sections at equal distances (to 1 %), none between two missing
+/// @param given  sections at equal distances (to 1 %), none between two missing; objects other than the two are not looked at
 /// Throws Error: sections too few or not at equal distances, an object missing, contours that cross (fault_of), an inner
 /// contour wholly outside the outer ones, an object that a section lacks between two that have it. On all cores; the same bytes at any number of threads.
-Surfaces surfaces_from(const ContourStack& stack, const SurfaceOptions& options, Progress& progress);
+Surfaces surfaces_from(const ContourStack& given, const SurfaceOptions& options, Progress& progress);
 
 /// Signed distances from an object's contours in a section, µm, negative within, at `width` × `height` points `step` apart,
 /// row by row from `origin`; none larger than `band`.

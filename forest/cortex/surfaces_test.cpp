@@ -146,7 +146,28 @@ TEST(SurfacesFrom, RefuseWhatCannotBeWithASentence) {
   EXPECT_EQ(sentence(good), "");
   EXPECT_NE(sentence(good, {.outer = "inner", .inner = "outer"}).find("outside"), std::string::npos);
   EXPECT_NE(sentence(good, {.outer = "pia"}).find("'pia'"), std::string::npos);
+  // What others there are is not looked at.
+  ContourStack more = good;
+  more.objects.push_back("dendrite");
+  for (Section& section : more.sections)
+    section.contours.push_back(
+        {2, straight_loop(std::array<Place, 4>{{{0., 0.}, {9e6, 9e6}, {9e6, 0.}, {0., 9e6}}})});
+  EXPECT_EQ(sentence(more), "");
   EXPECT_NE(sentence(good, {.voxel = 1.}).find("million points"), std::string::npos);
+  // Grey matter alone, with the white matter in its holes.
+  ContourStack grey = good;
+  for (Section& section : grey.sections)
+    for (std::size_t i = 0, count = section.contours.size(); i < count; ++i)
+      if (section.contours[i].object == 1) {
+        Contour hole = section.contours[i];
+        hole.object = 0;
+        std::ranges::reverse(hole.curve.points);
+        std::ranges::rotate(hole.curve.points, hole.curve.points.end() - 1);
+        section.contours.push_back(hole);
+      }
+  EXPECT_NE(sentence(grey).find("in holes of 'outer'; the outer boundary must hold grey and white matter"),
+            std::string::npos)
+      << sentence(grey);
   ContourStack one_swapped = good;
   for (Contour& contour : one_swapped.sections[good.sections.size() / 2].contours) contour.object ^= 1u;
   EXPECT_NE(sentence(one_swapped).find("exchange them there"), std::string::npos) << sentence(one_swapped);

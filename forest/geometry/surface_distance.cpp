@@ -11,6 +11,11 @@ namespace forest {
 
 using Place = TriangleTree::Place;
 
+double area_each(const Mesh& mesh) {
+  constexpr double most = 1e7;
+  return std::max(usual_area_each, area(mesh) / most);
+}
+
 std::vector<Place> evenly_on(const Mesh& mesh, double each) {
   std::vector<Place> places;
   double passed = 0.;

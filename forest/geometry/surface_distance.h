@@ -10,8 +10,11 @@
 
 namespace forest {
 
+inline constexpr double usual_area_each = 2.5e5;  // µm², of a place
+/// More than that for a surface larger than any cortex, so that it has no more than 10⁷ places.
+double area_each(const Mesh& mesh);
 /// A place for every so many µm² of a surface, in the triangle that it falls in: none of its parts says more than another.
-std::vector<TriangleTree::Place> evenly_on(const Mesh& mesh, double each = 2.5e5);
+std::vector<TriangleTree::Place> evenly_on(const Mesh& mesh, double each = usual_area_each);
 /// Its vertices. Of surfaces that were brought over from a template they crowd in sulci, so that these say more of sulci.
 std::vector<TriangleTree::Place> at_vertices(const Mesh& mesh);
 

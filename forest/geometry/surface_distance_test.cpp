@@ -44,6 +44,14 @@ TEST(SurfaceDistance, PlacesLieByArea) {
   }
 }
 
+TEST(SurfaceDistance, HasNoMorePlacesOnWhatIsLargerThanAnyCortex) {
+  const Mesh ball = icosphere(Vec3::Zero(), 1e5f, 3, 0), large = icosphere(Vec3::Zero(), 1e7f, 0, 0);
+  EXPECT_EQ(area_each(ball), usual_area_each);
+  EXPECT_NEAR(area(large) / area_each(large), 1e7, 1.);
+  const double each = 1000. * area_each(large);
+  EXPECT_NEAR(double(evenly_on(large, each).size()), 1e4, 1.);
+}
+
 TEST(SurfaceDistance, TellsWhereItIsGreatestAndHowManyAreNear) {
   const Mesh ball = icosphere(Vec3::Zero(), 1000.f, 3, 0);
   const TriangleTree tree(ball);

@@ -34,6 +34,16 @@ std::uint32_t object_of(ContourStack& stack, const std::string& name) {
   return std::uint32_t(std::ranges::find(stack.objects, name) - stack.objects.begin());
 }
 
+// What a file holds and a stack does not.
+struct Fault {
+  const char *of_one, *of_many;
+};
+constexpr Fault open_line{"is an open line", "are open lines"};
+std::string without(std::size_t count, const char* noun, const std::string& whose, const Fault& fault) {
+  return count == 1 ? fmt::format("a {}{} {} and was left out", noun, whose, fault.of_one)
+                    : fmt::format("{} {}s{} {} and were left out", count, noun, whose, fault.of_many);
+}
+
 std::string number(double value) {
   std::array<char, 32> digits;
   return {digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr};
@@ -232,10 +242,10 @@ class JsonReader {
     }
     if (result.stack.sections.empty())
       fail("has no section with contours; give a .contours, .jser, .slc or .svg file");
-    if (open) result.oddities.push_back(fmt::format("{} traces are open lines and were left out", open));
+    if (open) result.oddities.push_back(without(open, "trace", "", open_line));
     for (const auto& [object, count] : left_out)
-      result.oddities.push_back(fmt::format(
-          "{} traces of '{}' have fewer than three points and were left out", count, shown(object)));
+      result.oddities.push_back(without(count, "trace", fmt::format(" of '{}'", shown(object)),
+                                        {"has fewer than three points", "have fewer than three points"}));
     return result;
   }
 
@@ -307,7 +317,7 @@ ReadContours read_slc(std::string_view text, const std::string& name, double uni
   for (Section& section : sections) turn_insides_left(section, name);
   result.stack.sections = std::move(sections);
   if (result.stack.sections.empty()) throw InputError(name, 0, "has no slice; begin with 'slice Z'");
-  if (open) result.oddities.push_back(fmt::format("{} contours are open lines and were left out", open));
+  if (open) result.oddities.push_back(without(open, "contour", "", open_line));
   return result;
 }
 

@@ -206,12 +206,25 @@ TEST(Contours, OfSlicesAreClosedOnesWithTheInsideToTheLeft) {
   ASSERT_EQ(read.stack.sections.size(), 2u);
   EXPECT_EQ(read.stack.sections[0].at, 1000.);
   EXPECT_TRUE(read.stack.sections[0].contours.empty());
-  ASSERT_EQ(read.oddities.size(), 1u);
+  EXPECT_THAT(read.oddities, testing::ElementsAre("a contour is an open line and was left out"));
   ASSERT_EQ(read.stack.sections[1].contours.size(), 2u);
   EXPECT_NEAR(area(read.stack.sections[1].contours[0].curve), 81e6, 1.);
   EXPECT_NEAR(area(read.stack.sections[1].contours[1].curve), -4.5e6, 1.);
   EXPECT_NE(sentence("slice 1\ncontour closed\n1 x\n").find("c:3"), std::string::npos);
   EXPECT_NE(sentence("slice one\n"), "");
+}
+
+TEST(Contours, OfATracingProgramThatAreLeftOutAreTold) {
+  const std::string dot = R"({"x":[0,1],"y":[0,1],"closed":true})";
+  const auto oddities = [](const std::string& traces) {
+    return read_contours(R"({"sections":{"s.1":{"thickness":1,"contours":{"a":[)" + traces + "]}}}}",
+                         "s.jser")
+        .oddities;
+  };
+  EXPECT_THAT(oddities(dot),
+              testing::ElementsAre("a trace of 'a' has fewer than three points and was left out"));
+  EXPECT_THAT(oddities(dot + "," + dot),
+              testing::ElementsAre("2 traces of 'a' have fewer than three points and were left out"));
 }
 
 TEST(Contours, OfTracingProgramsAreRead) {

@@ -158,6 +158,7 @@ told distance.json 'all(0 < r["median"] < r["mean"] * 2 < .5 and r["p95"] <= r["
 $BRAINFOREST cortex distance outer outer --json >self.json
 told self.json 'all(r["greatest"] < 1e-6 for r in d)'
 [ "$(grep -vc '^#' away.txt)" = "$(python3 -c 'import json;print(json.load(open("distance.json"))[2]["count"])')" ]
+told distance.json '[r["each"] for r in d] == [.25, .25, None, None]'
 refuses 'already' $BRAINFOREST cortex distance outer inner --values away.txt
 refuses 'no_such' $BRAINFOREST cortex distance outer no_such
 refuses 'check that both are in mm' $BRAINFOREST cortex distance outer small
@@ -212,6 +213,17 @@ refuses 'is read here' $BRAINFOREST cortex faces e.h5 -o m.gii --values e.h5 --f
 refuses 'is read here' $BRAINFOREST cortex surfaces s.contours -o s.contours i.gii --force
 refuses 'is read here' $BRAINFOREST cortex contours s.contours -o s.contours --force
 for file in e.h5 s.contours; do cmp $file kept.$file; done
+$BRAINFOREST cortex contours s.contours -o sections --straight >/dev/null
+cp -r sections kept.sections
+mkdir linked && ln -s ../sections/section_0005.svg linked
+for file in sections/section_0005.svg ./sections/../sections/section_0005.svg linked/section_0005.svg; do
+  refuses 'holds what is read here' $BRAINFOREST cortex contours $file -o sections --force
+done
+diff -r sections kept.sections
+$BRAINFOREST cortex contours linked/section_0005.svg -o linked/sections --straight >/dev/null
+cp dent.border kept.border
+refuses 'is read here' $BRAINFOREST cortex lines outer inner -o dent.border --borders pole.border dent.border --force
+cmp dent.border kept.border
 
 # What could not be written in the end is refused before the work; nothing is left behind.
 refuses 'its folder is not there' $BRAINFOREST cortex build outer inner -o nowhere/e.h5
@@ -283,6 +295,21 @@ PY2
 $BRAINFOREST cortex compare shifted.contours --json >shifted.json 2>told.txt
 grep -q "contours of 'outer' and 'inner' cross at 2 places in 1 section, first in section 6 (" told.txt
 told shifted.json 'd["crossings"][0]["objects"] == ["outer", "inner"] and d["crossings"][0]["places"] == 2 and d["crossings"][0]["sections"] == 1'
+
+# Of one boundary, nothing is told of others, nor drawn.
+$BRAINFOREST cortex compare shifted.contours --object inner --svg inner_alone --json >inner_alone.json 2>told.txt
+told inner_alone.json 'd["crossings"] == [] and {p["object"] for p in d["pairs"]} == {"inner"}'
+[ ! -s told.txt ] && grep -q inner inner_alone/section_0006.svg
+! grep -q outer inner_alone/section_0006.svg
+refuses "no object 'pia'; name one of outer, inner" $BRAINFOREST cortex compare shifted.contours --object pia
+$BRAINFOREST cortex contours shifted.contours --object inner -o inner_alone.contours >/dev/null
+grep -q '"objects": \["inner"\]' inner_alone.contours
+
+# What has another unit is refused at once.
+sed 's/"unit": "um"/"unit": "mm"/' s.contours >mm.contours
+refuses 'look at their unit' $BRAINFOREST cortex contours mm.contours -o no.contours
+refuses 'look at their unit' $BRAINFOREST cortex compare mm.contours
+refuses 'look at their unit' $BRAINFOREST cortex surfaces mm.contours -o no.gii no2.gii
 
 # Contours that cross, and objects that were swapped.
 python3 - <<'PY2'
