@@ -69,12 +69,14 @@ void Console::warn(std::string_view sentence) {
   bar_.end();
   std::fflush(stdout);  // in one file or pipe with what was said before
   fmt::print(stderr, "{}\n", sentence);
+  warnings_.emplace_back(sentence);
 }
 
-void Console::print(const nlohmann::ordered_json& value) {
+void Console::print(nlohmann::ordered_json value) {
   bar_.end();
-  if (json)
-    fmt::print(output(), "{}\n", value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  if (!json) return;
+  if (value.is_object() && !warnings_.empty() && !value.contains("warnings")) value["warnings"] = warnings_;
+  fmt::print(output(), "{}\n", value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
 }
 
 void Console::table(const std::vector<std::string>& header,

@@ -40,14 +40,16 @@ class Console {
   unsigned threads = 0;  // --threads: 0 for all cores
 
   Progress& progress() { return bar_; }
-  void say(std::string_view line);                  // to standard output, unless --json
-  void warn(std::string_view sentence);             // to standard error
-  void print(const nlohmann::ordered_json& value);  // to standard output, when --json
+  void say(std::string_view line);       // to standard output, unless --json
+  void warn(std::string_view sentence);  // to standard error
+  /// To standard output, when --json; an object has, as `warnings`, what was warned of before.
+  void print(nlohmann::ordered_json value);
   /// Columns aligned, numbers right; to standard output, unless --json.
   void table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows);
 
  private:
   ProgressBar bar_;
+  std::vector<std::string> warnings_;
 };
 
 /// "1 finding", "2 findings", "2 losses": an s where no plural is given.
