@@ -90,6 +90,17 @@ fails_with 2 'excludes' $BRAINFOREST fit traced --form burke --calibrate -o both
 $BRAINFOREST grow --grammar motoneuron --count 12 --seed 2 --out others >/dev/null
 $BRAINFOREST judge --model like_them.lsys --train traced --held-out others --count 10 --populations 3 --repeats 2 --features judged.csv --json >judged.json
 python3 - <<'PY'
+# Axons that never fork keep to one tip; a folder may have any name.
+cp -r traced 'stubs' && mkdir -p 'odd/*' && cp traced/*-0000[0-3].swc 'odd/*'
+for file in stubs/*-0000[02].swc; do
+  printf '%s 2 0 %s 0 .5 %s\n' 900001 -20 1 900002 -30 900001 900003 -40 900002 >>$file
+done
+$BRAINFOREST fit stubs --kind all -o stubs.lsys >/dev/null 2>&1
+grep -q '^table most_tips = 2: 1, 3: ' stubs.lsys
+$BRAINFOREST grow --grammar stubs.lsys --count 40 --seed 1 --out stubs_grown >/dev/null
+$BRAINFOREST fit odd/* --form burke -o odd.lsys >/dev/null 2>&1
+grep -q '^title: neurons like those of' odd.lsys
+
 import json
 judged = json.load(open("judged.json"))
 assert judged["cells"]["grown"] == 10 and judged["seeds"] == [0, 1, 2], (judged["cells"], judged["seeds"])
