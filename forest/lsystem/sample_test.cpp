@@ -130,6 +130,15 @@ TEST(Sample, IsAskedInExpressions) {
   EXPECT_EQ(derive(many, 5, 7).parameters, derive(many, 5, 7).parameters);
 }
 
+TEST(Sample, AParameterOfItsNameIsThatParameter) {
+  const Grammar g = parse(
+      "sample s(-> b) = 8; 9\nfunction f(s) = 2 * s\naxiom: A(5)\n"
+      "p: A(s) -> B(s, f(s), s.b(1))\nq: B(a, b, c) -> C(s)\n",
+      "test");
+  EXPECT_EQ(to_string(derive(g, 0, 0, 1), g), "B(5,10,9)");
+  EXPECT_EQ(to_string(derive(g, 0, 0, 2), g), "C(0)");  // elsewhere the sample's number
+}
+
 TEST(Sample, WidthsMayDependOnWhatIsTheSame) {
   const Grammar g = parse(
       "table wide = 3: 0.1, 4: 100\nsample s(kind =, x ~ wide(kind)) = 3 0; 3 1; 4 0; 4 1\naxiom: A\ngrow: A "
