@@ -648,8 +648,10 @@ TEST(Trace, LeavesTheTurtleHeadingAsItEnds) {
 }
 
 TEST(Trace, OfWhatIsNotThereIsRefused) {
-  for (const char* word : {"Trace(twigs, 9, 0)", "Trace(twigs, 3, 0)", "Trace(twigs, 0, 1)", "Trace(7, 0, 0)",
-                           "Trace(twigs, 0.5, 0)"})
+  for (const char* word :
+       {"Trace(twigs, 9, 0)", "Trace(twigs, 3, 0)", "Trace(twigs, 0, 1)", "Trace(7, 0, 0)",
+        "Trace(twigs, 0.5, 0)", "Trace(twigs, 0, 0, mirror = 7)", "Trace(twigs, 0, 0, mirror = 0.5)",
+        "Trace(twigs, 0, 0, mirror = 1e300)", "Trace(twigs, 0, 0, mirror = -1)"})
     EXPECT_THROW((void)drawn(word), Error) << word;
 }
 
