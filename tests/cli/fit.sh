@@ -109,3 +109,4 @@ assert [groups.count(g) for g in ("grown", "grown 2", "grown 3")] == [10, 10, 10
 assert 1 <= judged["copying"]["longest_run"] <= 3, judged["copying"]
 assert judged["controls"]["burke"]["rejected"] in (True, False)
 PY
+refuses 'judged.csv is there already' $BRAINFOREST judge --model like_them.lsys --train traced --held-out others --features judged.csv
