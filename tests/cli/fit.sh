@@ -98,9 +98,16 @@ done
 $BRAINFOREST fit stubs --kind all -o stubs.lsys >/dev/null 2>&1
 grep -q '^table most_tips = 2: 1, 3: ' stubs.lsys
 $BRAINFOREST grow --grammar stubs.lsys --count 40 --seed 1 --out stubs_grown >/dev/null
-$BRAINFOREST fit odd/* --form burke -o odd.lsys >/dev/null 2>&1
-grep -q '^title: neurons like those of' odd.lsys
 
+# A population may have any name.
+$BRAINFOREST import traced/*-0000[0-3].swc --repo cells.db --population 'mine/*' >/dev/null
+$BRAINFOREST fit --repo cells.db --population 'mine/*' --form burke -o odd.lsys >/dev/null 2>&1
+grep -qF 'title: neurons like those of mine/ ' odd.lsys
+
+# The judge grows from the model and fits the control that it must reject.
+$BRAINFOREST grow --grammar motoneuron --count 12 --seed 2 --out others >/dev/null
+$BRAINFOREST judge --model like_them.lsys --train traced --held-out others --count 10 --populations 3 --repeats 2 --features judged.csv --json >judged.json
+python3 - <<'PY'
 import json
 judged = json.load(open("judged.json"))
 assert judged["cells"]["grown"] == 10 and judged["seeds"] == [0, 1, 2], (judged["cells"], judged["seeds"])
