@@ -241,10 +241,6 @@ void run(const Options& options, Console& console) {
               {.repeats = options.repeats, .permutations = options.permutations, .seed = options.seed},
               console.progress());
   warn_of_shared(samples[0], samples[1], console);
-  write_unless_there({{options.csv, options.csv.empty() ? "" : features_csv(tables, names)},
-                      {options.report, options.report.empty() ? "" : report_of(c, tables, names, options)}},
-                     options.force);
-
   console.print(json_of(c, names, options));
   console.say(sentence(c, names[0], names[1]));
   console.say("");
@@ -253,6 +249,9 @@ void run(const Options& options, Console& console) {
   std::vector<std::vector<std::string>> lines;
   for (const Difference* d : telling(c, completed(stacked(tables)), 12)) lines.push_back(row_of(*d));
   console.table(header_of(names), lines);
+  write_unless_there({{options.csv, options.csv.empty() ? "" : features_csv(tables, names)},
+                      {options.report, options.report.empty() ? "" : report_of(c, tables, names, options)}},
+                     options.force);
   if (!options.report.empty()) console.say(fmt::format("The report is {}", options.report.string()));
 }
 

@@ -247,8 +247,7 @@ void run(const Options& options, Console& console) {
                             counted(cells.size(), "neuron"), options.kind));
   if (!options.grammar.empty()) {
     write_unless_there(options.grammar,
-                       parametric_grammar(options.form, cells, options.grammar.stem().string(), kinds,
-                                          options.seed, console),
+                       parametric_grammar(options.form, cells, sample.name, kinds, options.seed, console),
                        options.force);
   }
   if (!options.report.empty())

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest fit: from traced neurons to a model that grows more of them.
 #include <cmath>
+#include <filesystem>
 #include <memory>
+#include <string_view>
 
 #include <CLI/App.hpp>
 #include <fmt/format.h>
@@ -18,6 +20,7 @@
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
 #include "apps/cli/grammars.h"
+#include "apps/cli/neurons.h"
 #include "apps/cli/options.h"
 #include "apps/cli/parametric_model.h"
 #include "apps/cli/samples.h"
@@ -121,6 +124,8 @@ Sample with_branches(Sample sample, statistics::KindSet kinds, Console& console)
 
 void run(const Options& options, Console& console) {
   must_take_files({options.out}, options.force);
+  if (std::error_code none; !options.model.empty() && std::filesystem::exists(options.repo, none))
+    repository::Repository::open(options.repo, repository::Access::write);  // told before hours of work
   const bool files = !options.files.empty();
   Sample sample = read_sample(files ? options.files : std::vector{options.population},
                               files ? "" : options.repo, console);
@@ -141,11 +146,20 @@ void run(const Options& options, Console& console) {
                              calibration.least));
   const std::string title = fmt::format("neurons like those of {}", of);
   fitting::Calibrated fitted;
-  if (options.form.empty())
-    fitted = fitting::calibrated_grammar(neurons, slices_of(sample, options.slices, console), title,
-                                         resampling, calibration, console.progress());
-  else
+  if (!options.form.empty()) {
     fitted.text = parametric_grammar(options.form, neurons, title, resampling.kinds, 1, console);
+  } else {
+    try {
+      fitted = fitting::calibrated_grammar(neurons, slices_of(sample, options.slices, console), title,
+                                           resampling, calibration, console.progress());
+    } catch (const Error& error) {
+      if (!std::string_view(error.what()).starts_with(title)) throw;
+      throw Error(
+          fmt::format("{} cannot be resampled, since what grows of them fails; mend what "
+                      "'brainforest check' tells of them, or leave such neurons out ({})",
+                      repository::escaped(of), repository::escaped(error.what())));
+    }
+  }
   const std::string text = provenance(options, sample) + fitted.text;
   const std::string name = options.model.empty() ? options.out.stem().string() : options.model;
   const lsystem::Grammar grammar =
@@ -200,7 +214,8 @@ std::function<void()> fit(CLI::App& command, Console& console) {
   CLI::Option* repo = command.add_option("--repo", options->repo, "The repository");
   population->needs(repo);
   CLI::Option_group* into = command.add_option_group("into", "where the model goes");
-  into->add_option("--model", options->model, "Its name in the repository")->needs(repo);
+  CLI::Option* model = into->add_option("--model", options->model, "Its name in the repository");
+  must_be_name(*model->needs(repo));
   into->add_option("-o,--out", options->out, "A file for the grammar");
   into->require_option(1, 2);
   command
@@ -239,7 +254,7 @@ std::function<void()> fit(CLI::App& command, Console& console) {
       ->check(CLI::Range(2, 64))
       ->needs(calibrate)
       ->capture_default_str();
-  add_slices(command, options->slices);
+  add_slices(command, options->slices)->needs(calibrate);
   add_force(command, options->force);
   return [options, &console] { run(*options, console); };
 }

@@ -248,12 +248,25 @@ void run_into_cells(const Options& options, Console& console) {
   if (grown.there) console.say(fmt::format("{} of them were there already", grown.there));
 }
 
+// Refuses the name of a neuron's file: nobody means a folder by it that is not there.
+void must_be_folder(const std::filesystem::path& out) {
+  const std::string extension = extension_of(out);
+  const auto ends_so = [&](const io::Format& f) { return std::ranges::count(f.extensions, extension) > 0; };
+  std::error_code none;
+  if (!std::filesystem::is_directory(out, none) && std::ranges::any_of(io::formats(), ends_so))
+    throw Error(
+        fmt::format("{}: neurons grow into a folder of SWC files, or into one file NAME.cells; name a "
+                    "folder",
+                    repository::escaped(out.string())));
+}
+
 void run(const Options& options, Console& console) {
   if (is_cells_file(options.out)) return run_into_cells(options, console);
   if (container_of(options.out))
     throw Error(fmt::format(
         "{}: neurons grow into a folder of SWC files or into one file NAME.cells; grow that and convert it",
         repository::escaped(options.out.string())));
+  must_be_folder(options.out);
   if (started_ranks() > 1)
     throw Error(
         "programs that mpirun started grow into one file of cells; name it with --out NAME.cells, or leave "

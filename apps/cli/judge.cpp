@@ -343,7 +343,7 @@ void leave_out(const Options& options, Console& console) {
 }
 
 void run(const Options& options, Console& console) {
-  must_take_files({options.features, options.report}, true);
+  must_take_files({options.features, options.report}, options.force);
   if (options.held_out.empty()) return leave_out(options, console);
   const Sample train = read_sample(options.train, options.repo, console),
                held_out = read_sample(options.held_out, options.repo, console);
@@ -385,6 +385,11 @@ void run(const Options& options, Console& console) {
   if (options.count > train.neurons.size())
     console.warn(fmt::format("there are {}, and no more neurons are judged of a population",
                              counted(train.neurons.size(), "training cell")));
+  auto json = json_of(judged.judgement, seeds);
+  json["fitted_to"] = known.size();  // of the cells that it is judged by
+  console.print(json);
+  tell_judgement(judged.judgement, console);
+  std::string features, report;
   if (!options.features.empty()) {
     std::vector<FeatureTable> tables{judged.train, judged.held_out};
     std::vector<std::string> names{"train", "held_out"};
@@ -392,19 +397,14 @@ void run(const Options& options, Console& console) {
       tables.push_back(population);
       names.push_back(names.size() == 2 ? "grown" : fmt::format("grown {}", names.size() - 1));
     }
-    write_unless_there(options.features, features_csv(tables, names), options.force);
+    features = features_csv(tables, names);
   }
   if (!options.report.empty())
-    write_unless_there(options.report,
-                       report_of(judged,
-                                 which_is_which(held_out.neurons, grown.front().neurons, 6,
-                                                statistics::kind_set(options.kind), options.seed),
-                                 "Grown neurons on trial: " + grown.front().name),
-                       options.force);
-  auto json = json_of(judged.judgement, seeds);
-  json["fitted_to"] = known.size();  // of the cells that it is judged by
-  console.print(json);
-  tell_judgement(judged.judgement, console);
+    report = report_of(judged,
+                       which_is_which(held_out.neurons, grown.front().neurons, 6,
+                                      statistics::kind_set(options.kind), options.seed),
+                       "Grown neurons on trial: " + grown.front().name);
+  write_unless_there({{options.features, features}, {options.report, report}}, options.force);
 }
 
 }  // namespace

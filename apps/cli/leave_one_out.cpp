@@ -156,6 +156,13 @@ void judge_leaving_out(const LeftOutTrial& trial, Console& console) {
   }
   const LeaveOneOut result =
       leave_one_out(known, grown, {.repeats = trial.repeats, .seed = trial.seed}, console.progress());
+  console.print(json_of(result, trial, longest_run));
+  console.say(sentence(result));
+  console.say("");
+  console.table(head_of_cells, rows_of_cells(result));
+  console.say("");
+  console.table(head_of_features, rows_of_features(result, 12));
+  std::string features;
   if (!trial.features.empty()) {
     std::vector<FeatureTable> tables{known};
     std::vector<std::string> names{"traced"};
@@ -163,15 +170,11 @@ void judge_leaving_out(const LeftOutTrial& trial, Console& console) {
       tables.push_back(grown[i]);
       names.push_back("grown without " + (trial.model || trial.grown ? "any" : traced.cells[i]));
     }
-    write_unless_there(trial.features, features_csv(tables, names), trial.force);
+    features = features_csv(tables, names);
   }
-  if (!trial.report.empty()) write_unless_there(trial.report, html_of(result, known, grown), trial.force);
-  console.print(json_of(result, trial, longest_run));
-  console.say(sentence(result));
-  console.say("");
-  console.table(head_of_cells, rows_of_cells(result));
-  console.say("");
-  console.table(head_of_features, rows_of_features(result, 12));
+  write_unless_there(
+      {{trial.features, features}, {trial.report, trial.report.empty() ? "" : html_of(result, known, grown)}},
+      trial.force);
 }
 
 }  // namespace forest::cli

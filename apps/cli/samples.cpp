@@ -238,8 +238,8 @@ void set_slices(std::span<statistics::FeatureTable* const> tables, const std::st
         expression, cells - matched, counted(cells, "name"), repository::escaped(without)));
 }
 
-void add_slices(CLI::App& command, std::string& expression) {
-  command
+CLI::Option* add_slices(CLI::App& command, std::string& expression) {
+  return command
       .add_option("--slices", expression,
                   "Cells in whose names this regular expression finds the same are sisters, of one slice or "
                   "animal, and "

@@ -12,7 +12,8 @@
 
 namespace CLI {
 class App;
-}
+class Option;
+}  // namespace CLI
 
 namespace forest::cli {
 
@@ -54,7 +55,7 @@ void set_slices(std::span<statistics::FeatureTable* const> tables, const std::st
                 Console& console);
 
 /// --slices, a regular expression.
-void add_slices(CLI::App& command, std::string& expression);
+CLI::Option* add_slices(CLI::App& command, std::string& expression);
 
 /// --kind, as the verb measure has it.
 void add_kind(CLI::App& command, std::string& kind);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/core/round_numbers.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace forest {
@@ -26,12 +27,12 @@ double round_above(double least) {
 
 std::vector<double> ticks(double low, double high, int count) {
   const double span = high - low;
-  if (!(span > 0.) || !std::isfinite(span)) return {low};
-  const double step = round_above(span / count);
+  constexpr double same = 1e-9;  // but for what rounding makes of it
+  if (!(span > same * std::max(std::abs(low), std::abs(high))) || !std::isfinite(span)) return {low};
+  const double step = round_above(span / count), first = std::ceil(low / step - same);
   std::vector<double> out;
   // A step's billionth more or less is the same number; no zero is negative.
-  for (double k = std::ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; ++k)
-    out.push_back(k * step + 0.);
+  for (int i = 0; (first + i) * step <= high + same * step; ++i) out.push_back((first + i) * step + 0.);
   return out;
 }
 

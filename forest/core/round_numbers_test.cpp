@@ -53,6 +53,8 @@ TEST(Ticks, AreRoundAndWithinAndNoMoreThanAskedFor) {
 TEST(Ticks, OfNoSpanAreWhereItBegins) {
   EXPECT_EQ(ticks(4., 4., 5), (std::vector<double>{4.}));
   EXPECT_EQ(ticks(4., std::numeric_limits<double>::infinity(), 5), (std::vector<double>{4.}));
+  EXPECT_EQ(ticks(376.99111843077515, 376.9911184307752, 4).size(), 1u);  // a rounding apart
+  EXPECT_EQ(ticks(-1e15, -1e15 + .25, 4).size(), 1u);
 }
 
 }  // namespace

@@ -206,6 +206,7 @@ std::string title_of(const std::string& name) {
   std::string title = name;
   for (char& c : title)
     if (static_cast<unsigned char>(c) < ' ' || c == '#') c = ' ';
+  for (std::size_t at = 0; (at = title.find("/*", at)) != title.npos;) title[at + 1] = ' ';
   return title;
 }
 

@@ -89,6 +89,12 @@ TEST(ParametricModels, AreWrittenForWhateverHasABranch) {
   EXPECT_THROW(hillman_grammar({}, "none"), Error);
 }
 
+TEST(ParametricModels, HaveTheNameOfAnyFolder) {
+  const std::vector<Morphology> cells{zoo_parts::binary_tree(3)};
+  for (const char* name : {"mine/*", "/*/*//**", "# /*"})
+    EXPECT_NO_THROW(lsystem::parse(burke_grammar(cells, name, {.rounds = 0}), "model")) << name;
+}
+
 // Forks a hundred times as likely as ends: without the guard such cells have 2^100 tips.
 TEST(Burke, DoesNotRunAway) {
   const std::vector<Morphology> cells{zoo_parts::binary_tree(9)};

@@ -631,8 +631,11 @@ function own(mine, one_s, other_s) = kept * (mine + stray * (one_s - other_s))
           knobs[k].name, tuning_, [&](const auto& values) { return values[k]; }, knobs[k].says);
     put(R"(# No stem has more tips, or reaches farther (µm), than half as much again as the largest that was traced.
 )");
-    most("most_tips", 1., [](const Stem& stem) { return stem.tips; });
-    most("most_ahead", 10., [](const Stem& stem) { return stem.ahead; });
+    std::map<int, double> tips = most(1., [](const Stem& stem) { return stem.tips; });
+    for (auto& [kind, most_tips] : tips)
+      if (!std::ranges::count(traced_.forks, kind, &Fork::kind)) most_tips = 1.;  // it has none to draw
+    table("most_tips", tips, std::identity{}, "", 9);
+    table("most_ahead", most(10., [](const Stem& stem) { return stem.ahead; }), std::identity{}, "", 9);
   }
 
   // A table by kind.
@@ -652,9 +655,10 @@ function own(mine, one_s, other_s) = kept * (mine + stray * (one_s - other_s))
     return result;
   }
   // Half as much again as the largest, rounded up.
-  void most(std::string_view name, double steps, auto&& of) {
-    table(
-        name, largest(of), [&](double value) { return std::ceil(1.5 * value * steps) / steps; }, "", 9);
+  std::map<int, double> most(double steps, auto&& of) const {
+    std::map<int, double> result = largest(of);
+    for (auto& [kind, value] : result) value = std::ceil(1.5 * value * steps) / steps;
+    return result;
   }
 
   // A table of the widths of a kernel: a share of the standard deviation among the forks of each kind.

@@ -233,6 +233,35 @@ fork: Tip(n, d) : n < 5 { a = d * uniform(0.7, 1), b = d * uniform(0.7, 1) }
   EXPECT_GT(once, 1.25 * wanted);
 }
 
+// What never forks where it was traced has no fork to draw, however much the number of its tips is changed.
+TEST(Resampling, AKindThatNeverForksKeepsToOneTip) {
+  const std::vector<Morphology> models =
+      each_with(6, 3, [](MorphologyBuilder& builder, Random& random, std::uint64_t i) {
+        const auto path = [&](Point from, float x, float y) {
+          std::vector<Point> points{from};
+          for (int k = 0; k < 6; ++k) {
+            Point p = points.back();
+            p.x += x + float(random.normal()), p.y += y + float(random.normal());
+            points.push_back(p);
+          }
+          return points;
+        };
+        for (float side : {-1.f, 1.f}) {
+          const auto stem = path({0, 5, 0, 1}, side, 5);
+          const SectionId root = builder.add_section({}, SectionKind::basal, stem);
+          for (float way : {-3.f, 3.f})
+            builder.add_section(root, SectionKind::basal, path(stem.back(), way, 4));
+        }
+        for (std::uint64_t stub = 0; stub <= i % 3; ++stub)
+          builder.add_section({}, SectionKind::axon, path({float(stub), -5, 0, .5f}, 1, -8));
+      });
+  const std::string text =
+      with(resampling_grammar(models, "stubs", {.kinds = statistics::kind_set("all")}), "jitter", "3");
+  EXPECT_NE(text.find("\ntable most_tips = 2: 1, 3: "), text.npos);
+  for (const Morphology& n : lsystem::grow_population(lsystem::parse(text, "stubs"), 60, 1))
+    for (const Section& s : n.sections()) EXPECT_TRUE(s.kind != SectionKind::axon || !s.parent.valid());
+}
+
 TEST(Resampling, TheSameNeuronsGiveTheSameText) {
   const std::vector<Morphology> models = traced(6);
   const std::string text = resampling_grammar(models, "t");

@@ -185,6 +185,12 @@ struct Deriver::State {
     return true;
   }
 
+  bool holds(const Production& p, Random& random) {
+    const double value = p.condition.empty() ? 1. : evaluate(p.condition, p.line, random)[-1];
+    if (std::isnan(value)) fail(p, "has a condition that is no number; keep its expressions in their domain");
+    return value != 0.;
+  }
+
   // The production that rewrites the node; its parameters are in the slots. Null when the node stays as it
   // is.
   const Production* choose(std::uint32_t n, Random& random) {
@@ -194,8 +200,8 @@ struct Deriver::State {
     for (const std::uint32_t index : grammar.productions_of[nodes[n].symbol]) {
       const Production& p = grammar.productions[index];
       if ((certain && p.weight.empty()) || !matches(p, n)) continue;
-      if (!p.condition.empty() && evaluate(p.condition, p.line, random)[-1] == 0.) continue;
       last = &p;
+      if (!holds(p, random)) continue;
       if (p.weight.empty()) {
         certain = &p;
         continue;
@@ -228,7 +234,8 @@ struct Deriver::State {
         std::copy_n(parameters.begin() + nodes[n].first, nodes[n].count, slots.begin());
         const double key = t.key < 0 ? 0. : slots[std::size_t(t.key)],
                      value = evaluate(t.value, t.line, random)[-1];
-        if (key >= 0. && key < double(keys)) cell[t.place + std::size_t(key)] += value;
+        if (key >= 0. && key < double(keys) && key == std::floor(key))
+          cell[t.place + std::size_t(key)] += value;
       }
     }
   }

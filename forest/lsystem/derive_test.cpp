@@ -118,6 +118,18 @@ TEST(Derivation, WhatProbabilitiesLeaveGoesToTheCertainOrKeepsTheModule) {
   EXPECT_EQ(share("axiom: A\np: A -> B : 0\nq: A -> C : 0\n", "A"), 1.);
 }
 
+// A later production that fits but for its condition leaves no trace, whatever its context and its functions put where.
+TEST(Derivation, AProductionHasItsOwnParametersWhateverOthersAreAsked) {
+  for (const char* two :
+       {"two: M(a) < A(d) : a > 100 -> B(1)\n", "two: A(d) : sum(8, 9 + d, 7) < 0 -> B(1)\n"})
+    EXPECT_EQ(derived(std::string("function sum(x, y, z) = y * z + x * y\naxiom: M(7) A(2)\n"
+                                  "one: A(d) -> B(10 * d) : 0.99999999999\n") +
+                          two,
+                      1),
+              "M(7)B(20)")
+        << two;
+}
+
 TEST(Derivation, ARunawayProductionIsStoppedAndNamed) {
   const Grammar g =
       parse("limit: 1000\nsteps: 100\naxiom: AB\nquiet: B -> B\nrabbits: A -> AA\n", "runaway.lsys");
@@ -142,6 +154,20 @@ TEST(Derivation, WhatIsNoNumberIsAnErrorThatNamesTheProduction) {
   }
   EXPECT_THROW(derived("axiom: A\np: A -> B : -1\n", 1), Error);
   EXPECT_THROW(derived("axiom: A(0/0)\np: A -> B\n", 1), Error);
+}
+
+TEST(Derivation, AConditionThatIsNoNumberIsAnErrorWithItsLine) {
+  for (const char* condition : {"log(-x)", "!log(-x)", "x & log(-x)", "log(-x) | 0", "t(log(-x))",
+                                "if(log(-x), 1, 1)", "if(!t(0/0 * x), 1, 1)"}) {
+    const Grammar g =
+        parse(std::string("table t = 1: 5\naxiom: A(1)\nculprit: A(x) : ") + condition + " -> B\n", "test");
+    const std::string why = refused([&] { derive(g, 0, 0, 1); });
+    EXPECT_NE(why.find("test:3: "), why.npos) << condition << ": " << why;
+    EXPECT_NE(why.find("no number; "), why.npos) << condition << ": " << why;
+  }
+  // What does not hang on it is as it was, and comparisons with it are false.
+  for (const char* condition : {"!(log(-x) > 0)", "x | log(-x)", "log(-x) | x", "!(0 & log(-x))"})
+    EXPECT_EQ(derived(std::string("axiom: A(1)\np: A(x) : ") + condition + " -> B\n", 1), "B") << condition;
 }
 
 TEST(Derivation, LongHistoriesTakeNoMemoryOfTheirOwn) {
@@ -187,6 +213,12 @@ TEST(Derive, TotalsSayWhatIsWrongWithThem) {
   // Beyond its whole numbers a total by a parameter is not a number, which a production says of itself.
   const Grammar g = parse("total n(x) = A(x) : 1\naxiom: A(70)\ng: A(x) -> A(n(x))\n", "t");
   EXPECT_THROW(derive(g, 0, 0, 1), InputError);
+  EXPECT_THROW(derived("total n(x) = A(x) : 1\naxiom: A(2.5)\ng: A(x) -> A(n(x))\n", 1), InputError);
+}
+
+TEST(Derive, TotalsAreOfWholeNumbers) {
+  EXPECT_EQ(derived("total n(x) = A(x) : 1\naxiom: A(2) A(2.7) B\ng: B -> C(n(2))\nh: A(x) -> A(x)\n", 1),
+            "A(2)A(2.7)C(1)");
 }
 
 }  // namespace

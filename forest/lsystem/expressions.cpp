@@ -13,7 +13,8 @@
 namespace forest::lsystem {
 namespace {
 
-constexpr int deepest = 100;  // nested parentheses
+constexpr int deepest = 100;                   // nested parentheses
+constexpr std::size_t most_inlined = 100'000;  // instructions of functions in one expression
 
 struct Binary {
   std::string_view token;
@@ -118,6 +119,7 @@ void Compiler::binding(Program& out) {
   text_.expect("=", "between a name and its value");
   expression(out);
   out.push_back({Op::store, slots_, 0.});
+  if (first_binding_ < 0) first_binding_ = slots_;
   add_slot(name);
 }
 
@@ -172,12 +174,17 @@ void Compiler::named(Program& out) {
   const std::size_t place = text_.at();
   const std::string name = text_.name("in an expression");
   if (text_.takes("(")) return call(out, name, place);
-  if (const auto sample = meanings_.find(name);
-      sample != meanings_.end() && sample->second.kind == Meaning::sample)
-    return outcome(out, name, sample->second);
-  for (std::size_t i = 0; i < names_.size(); ++i)
-    if (names_[i] == name) return out.push_back({Op::slot, std::int32_t(i), 0.});
   const auto found = meanings_.find(name);
+  const bool sample = found != meanings_.end() && found->second.kind == Meaning::sample;
+  if (const std::int32_t slot = slot_of(name); slot >= 0 && !(sample && text_.sees("."))) {
+    if (hidden_ && first_binding_ >= 0 && slot >= first_binding_)
+      text_.fail_at(place,
+                    fmt::format("'{}' is a binding, which is worked out when the production was chosen; "
+                                "write its probability by parameters",
+                                name));
+    return out.push_back({Op::slot, slot, 0.});
+  }
+  if (sample) return outcome(out, name, found->second);
   if (found == meanings_.end())
     text_.fail_at(
         place,
@@ -221,6 +228,12 @@ void Compiler::call(Program& out, const std::string& name, std::size_t place) {
   const auto found = meanings_.find(name);
   if (found != meanings_.end() && found->second.kind == Meaning::function) {
     const Meaning& f = found->second;
+    inlined_ += f.body.size();
+    if (inlined_ > most_inlined)
+      text_.fail_at(place,
+                    fmt::format("with all that {} and other functions call the expression has more than "
+                                "{} instructions; keep parts of it in bindings or parameters",
+                                name, most_inlined));
     const std::int32_t base = slots_;
     slots_ += f.slots;
     const std::vector<std::size_t> begins = arguments(out, {name, f.parameters});

@@ -46,7 +46,10 @@ class Compiler {
   /// Of a parameter or binding; -1 when there is none of that name.
   std::int32_t slot_of(const std::string& name) const;
 
-  void expression(Program& out) { binary(out, 0); }
+  void expression(Program& out) {
+    if (depth_ == 0) inlined_ = 0;
+    binary(out, 0);
+  }
 
   /// Arguments and the parenthesis behind them: in order, then by name, `reach = 5`, with the default of what is left out
   /// before the last.
@@ -55,6 +58,8 @@ class Compiler {
 
   /// `name = expression` as a store.
   void binding(Program& out);
+  /// From here on bindings may not be named.
+  void hide_bindings() { hidden_ = true; }
 
  private:
   void binary(Program& out, int least);
@@ -85,8 +90,10 @@ class Compiler {
   std::vector<std::string> names_;  // of slots; those of inlined functions have none
   std::int32_t slots_ = 0;
   std::size_t barrier_ = 0;
+  std::int32_t first_binding_ = -1;  // its slot
+  std::size_t inlined_ = 0;          // instructions of functions, in the expression that is read
   int depth_ = 0;
-  bool draws_ = false, sums_ = false;
+  bool draws_ = false, sums_ = false, hidden_ = false;
 };
 
 }  // namespace forest::lsystem

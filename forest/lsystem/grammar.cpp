@@ -44,6 +44,8 @@ std::string without_comments(std::string_view text, const Cursor& place) {
   return out;
 }
 
+bool draws_as_f(std::string_view symbol) { return symbol.starts_with("F_"); }
+
 class Parser {
  public:
   Parser(std::string_view text, const std::string& file)
@@ -485,6 +487,7 @@ class Parser {
     }
     text_.expect("->", "before the successor");
     successor(compiler, p.successor, p.values);
+    compiler.hide_bindings();
     if (text_.takes(":")) compiler.expression(p.weight);
     for (const Program* program : {&p.condition, &p.bindings, &p.values, &p.weight}) note(*program, compiler);
     grammar_.productions.push_back(std::move(p));
@@ -643,7 +646,9 @@ class Parser {
     if (own == 1 && rest.size() > 1 && rest[0] == '?' && is_letter(rest[1]) && length == 0)
       text_.fail(fmt::format("?{} is no question; there are {}", rest[1], questions()));
     if (own > length) {
-      best = add_symbol(std::string(rest.substr(0, own)), {});
+      std::string name(rest.substr(0, own));
+      Arity arity = draws_as_f(name) ? arities_[std::size_t(Action::draw)] : Arity();
+      best = add_symbol(std::move(name), std::move(arity));
       length = own;
     }
     text_.skip(length);
@@ -666,7 +671,7 @@ class Parser {
     grammar_.ignored.assign(grammar_.symbols.size(), false);
     for (const Symbol s : ignored_) grammar_.ignored[s] = true;
     for (std::size_t i = 0; i < grammar_.symbols.size(); ++i)
-      grammar_.drawn_as.push_back(grammar_.symbols[i].starts_with("F_") ? Symbol(Action::draw) : Symbol(i));
+      grammar_.drawn_as.push_back(draws_as_f(grammar_.symbols[i]) ? Symbol(Action::draw) : Symbol(i));
     const auto question = [&](const Shape& s) {
       return s.symbol < turtle_symbols().size() && is_question(turtle_symbols()[s.symbol].action);
     };

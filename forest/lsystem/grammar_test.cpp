@@ -13,6 +13,8 @@
 #include "forest/core/error.h"
 #include "forest/lsystem/derive.h"
 
+#include "tests/refused.h"
+
 namespace forest::lsystem {
 namespace {
 
@@ -289,6 +291,8 @@ TEST(Grammar, ErrorsNameLineColumnAndRemedy) {
       {"axiom: A /* open\np: A -> B\n", 1, "column 10: the comment is not closed"},
       {"axiom: A\n\n  \np: A ->\n  B\n  C(1 +)\n", 6, "column 8: a number, a name"},
       {"axiom: A\np: [ -> B\n", 2, "bracket"},
+      {"axiom: A(1)\np: A(x) { r = x } -> B : r\n", 2, "column 26: 'r' is a binding"},
+      {"axiom: A\np: A -> F_x(10, 1, 5, 7)\n", 2, "module F_x has 0 to 2 parameters, 4 given"},
       {"axiom: \xff\np: A -> B\n", 1, "no module"},
   };
   for (const Bad& bad : table) {
@@ -329,6 +333,16 @@ TEST(Grammar, DeepNestingIsRefusedNotSuffered) {
   EXPECT_THROW(parse("axiom: A\np: A -> B(" + deep + "1\n", "deep"), InputError);
   const std::string minus(100000, '-');
   EXPECT_THROW(parse("axiom: A\np: A -> B(" + minus + "1)\n", "deep"), InputError);
+}
+
+// Each function calls the one above it twice, so that it is twice as long when it is written out.
+TEST(Grammar, FunctionsThatGrowBeyondMeasureAreRefused) {
+  std::string text = "function f0(x) = x + 1\n";
+  for (int i = 1; i < 60; ++i) text += fmt::format("function f{0}(x) = f{1}(x) + f{1}(x + 1)\n", i, i - 1);
+  const std::string why =
+      refused<InputError>([&] { parse(text + "axiom: A\np: A -> F(f59(1))\n", "deep.lsys"); });
+  EXPECT_NE(why.find("more than 100000 instructions"), why.npos) << why;
+  EXPECT_TRUE(why.starts_with("deep.lsys:1")) << why;
 }
 
 // Cut anywhere, with anything put in: a value or an InputError, never anything else.

@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "forest/core/error.h"
 #include "forest/core/parallel.h"
 #include "forest/lsystem/derive.h"
 #include "forest/lsystem/turtle.h"
@@ -23,6 +25,23 @@ Annotations source(const Grammar& grammar, std::uint64_t seed, std::uint64_t ind
   if (site.environment)
     list.emplace_back("grown_at", fmt::format("{}, {}, {}", site.at.x(), site.at.y(), site.at.z()));
   return list;
+}
+
+// What grows, or an error that names it.
+template <class Growing>
+auto named(std::uint64_t seed, std::uint64_t index, const Growing& growing) {
+  const auto told = [&](std::string_view what) {
+    return fmt::format("{} (neuron {} of seed {})", what, index, seed);
+  };
+  try {
+    return growing();
+  } catch (const InputError& error) {
+    throw InputError(error.file(), error.line(), told(error.sentence()));
+  } catch (const LimitError& error) {
+    throw LimitError(told(error.what()));
+  } catch (const Error& error) {
+    throw Error(told(error.what()));
+  }
 }
 
 constexpr std::uint32_t choice_stream = 0x70696368;  // "pick"
@@ -53,7 +72,7 @@ std::pair<Morphology, std::uint32_t> chosen(Deriver& deriver, const Grammar& gra
 }  // namespace
 
 Morphology grow(Deriver& deriver, const Grammar& grammar, std::uint64_t seed, std::uint64_t index) {
-  return chosen(deriver, grammar, seed, index).first;
+  return named(seed, index, [&] { return chosen(deriver, grammar, seed, index).first; });
 }
 
 Morphology grow(const Grammar& grammar, std::uint64_t seed, std::uint64_t index, const cortex::Site& site) {
@@ -65,8 +84,10 @@ Morphology grow_to(Deriver& deriver, const Grammar& grammar, std::uint64_t seed,
                    int steps) {
   Annotations annotations = source(grammar, seed, index, deriver.site());
   annotations.emplace_back("step", std::to_string(steps));
-  const std::uint32_t candidate = grammar.tastes.empty() ? 0 : chosen(deriver, grammar, seed, index).second;
-  return interpret(deriver.derive(seed, index, steps, candidate), grammar, annotations, deriver.site());
+  return named(seed, index, [&] {
+    const std::uint32_t candidate = grammar.tastes.empty() ? 0 : chosen(deriver, grammar, seed, index).second;
+    return interpret(deriver.derive(seed, index, steps, candidate), grammar, annotations, deriver.site());
+  });
 }
 
 std::vector<Morphology> grow_population(const Grammar& grammar, std::size_t count, std::uint64_t seed,

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "forest/core/error.h"
@@ -11,6 +12,8 @@
 #include "forest/morphology/validate.h"
 #include "forest/statistics/metric.h"
 #include "forest/statistics/summary.h"
+
+#include "tests/refused.h"
 
 namespace forest::lsystem {
 namespace {
@@ -80,6 +83,31 @@ TEST(Grow, TheDocumentedExampleGrows) {
     EXPECT_GE(m.segment_count(), 19u);
     for (std::size_t i = 0; i < m.sections().size(); ++i) EXPECT_LE(m.children(SectionId(i)).size(), 2u);
   }
+}
+
+// Of seven neurons one fails, and which one is said; the kind of error is what it was.
+TEST(Grow, ErrorsNameTheNeuron) {
+  const struct {
+    const char* successor;
+    const char* begins;
+  } rows[] = {{"F(1 / (1 - bad))", "odd.lsys:4: production p gives F a parameter"},
+              {"F(1) Kind(if(bad, -1, 2))", "odd.lsys: Kind(-1) is no SWC type"}};
+  for (const auto& row : rows) {
+    const Grammar g = parse(
+        std::string("steps: 2\ncell bad = dealt(7) == 3\naxiom: Soma(9) A\np: A -> ") + row.successor + "\n",
+        "odd.lsys");
+    std::vector<std::uint64_t> failed;
+    for (std::uint64_t i = 0; i < 7; ++i) {
+      const std::string why = refused([&] { grow(g, 5, i); });
+      if (why.empty()) continue;
+      failed.push_back(i);
+      EXPECT_TRUE(why.starts_with(row.begins)) << why;
+      EXPECT_TRUE(why.ends_with(fmt::format(" (neuron {} of seed 5)", i))) << why;
+    }
+    EXPECT_EQ(failed.size(), 1u);
+  }
+  const Grammar rabbits = parse("limit: 100\nsteps: 100\naxiom: A\np: A -> AA\n", "rabbits.lsys");
+  EXPECT_NE(refused<LimitError>([&] { grow(rabbits, 5, 2); }).find("neuron 2 of seed 5"), std::string::npos);
 }
 
 // No built-in grammar may run away for any seed: here 200 neurons of each.

@@ -6,6 +6,8 @@
 #include <limits>
 #include <numbers>
 
+#include "forest/core/error.h"
+
 namespace forest::lsystem {
 namespace {
 
@@ -122,6 +124,10 @@ double dealt(const Random& random, double cards) {
 
 double modulo(double x, double y) { return x - y * std::floor(x / y); }
 
+// 1 or 0; of what is no number that, which false and anything is not.
+double truth(double x) { return std::isnan(x) ? x : double(x != 0.); }
+double both(double x, double y) { return x == 0. || y == 0. ? 0. : x * y; }
+
 // How many operands an instruction takes from the stack and how many results it leaves.
 struct Effect {
   int taken, left;
@@ -158,6 +164,7 @@ Effect effect(const Instruction& instruction) {
 std::span<const Function> functions() { return function_table; }
 
 double Table::lookup(double x) const {
+  if (std::isnan(x)) return nonsense;
   const auto bin = std::size_t(std::ranges::lower_bound(edges, x) - edges.begin());
   return values[std::min(bin, values.size() - 1)];
 }
@@ -194,7 +201,9 @@ double* run(std::span<const Instruction> program, double* slots, std::span<const
         break;
       case Op::cell_at:
         unary([&](double key) {
-          return key >= 0. && key < total_keys ? cell[std::size_t(i->index) + std::size_t(key)] : nonsense;
+          return key >= 0. && key < total_keys && key == std::floor(key)
+                     ? cell[std::size_t(i->index) + std::size_t(key)]
+                     : nonsense;
         });
         break;
       case Op::store:
@@ -204,7 +213,9 @@ double* run(std::span<const Instruction> program, double* slots, std::span<const
         i += i->index;
         break;
       case Op::jump_if_zero:
-        if (*--top == 0.) i += i->index;
+        if (std::isnan(*--top))
+          throw Error("the condition of an if() is no number; keep its expressions in their domain");
+        if (*top == 0.) i += i->index;
         break;
       case Op::table:
         unary([&](double x) { return lookups.tables[std::size_t(i->index)].lookup(x); });
@@ -264,13 +275,13 @@ double* run(std::span<const Instruction> program, double* slots, std::span<const
         binary([](double a, double b) { return double(a != b); });
         break;
       case Op::logical_and:
-        binary([](double a, double b) { return double(a != 0. && b != 0.); });
+        binary([](double a, double b) { return both(truth(a), truth(b)); });
         break;
       case Op::logical_or:
-        binary([](double a, double b) { return double(a != 0. || b != 0.); });
+        binary([](double a, double b) { return 1. - both(1. - truth(a), 1. - truth(b)); });
         break;
       case Op::logical_not:
-        unary([](double a) { return double(a == 0.); });
+        unary([](double a) { return 1. - truth(a); });
         break;
       case Op::sin:
         unary([](double a) { return std::sin(a * degree); });

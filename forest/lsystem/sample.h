@@ -87,7 +87,7 @@ std::vector<Calibre> calibres(const Trace& of, std::span<const float> along);
 inline constexpr float heading_reach = 20.f;
 Vec3 heading_at_end(const Vec3& from, std::span<const Trace::Stop> stops);
 
-/// Values by bin: lookup(x) is the value of the first bin whose upper edge is >= x, else the last.
+/// Values by bin: lookup(x) is the value of the first bin whose upper edge is >= x, else the last; of no number none.
 struct Table {
   std::string name;
   std::vector<double> edges, values;  // edges strictly increasing

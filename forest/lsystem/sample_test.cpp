@@ -130,6 +130,15 @@ TEST(Sample, IsAskedInExpressions) {
   EXPECT_EQ(derive(many, 5, 7).parameters, derive(many, 5, 7).parameters);
 }
 
+TEST(Sample, AParameterOfItsNameIsThatParameter) {
+  const Grammar g = parse(
+      "sample s(-> b) = 8; 9\nfunction f(s) = 2 * s\naxiom: A(5)\n"
+      "p: A(s) -> B(s, f(s), s.b(1))\nq: B(a, b, c) -> C(s)\n",
+      "test");
+  EXPECT_EQ(to_string(derive(g, 0, 0, 1), g), "B(5,10,9)");
+  EXPECT_EQ(to_string(derive(g, 0, 0, 2), g), "C(0)");  // elsewhere the sample's number
+}
+
 TEST(Sample, WidthsMayDependOnWhatIsTheSame) {
   const Grammar g = parse(
       "table wide = 3: 0.1, 4: 100\nsample s(kind =, x ~ wide(kind)) = 3 0; 3 1; 4 0; 4 1\naxiom: A\ngrow: A "
@@ -639,8 +648,10 @@ TEST(Trace, LeavesTheTurtleHeadingAsItEnds) {
 }
 
 TEST(Trace, OfWhatIsNotThereIsRefused) {
-  for (const char* word : {"Trace(twigs, 9, 0)", "Trace(twigs, 3, 0)", "Trace(twigs, 0, 1)", "Trace(7, 0, 0)",
-                           "Trace(twigs, 0.5, 0)"})
+  for (const char* word :
+       {"Trace(twigs, 9, 0)", "Trace(twigs, 3, 0)", "Trace(twigs, 0, 1)", "Trace(7, 0, 0)",
+        "Trace(twigs, 0.5, 0)", "Trace(twigs, 0, 0, mirror = 7)", "Trace(twigs, 0, 0, mirror = 0.5)",
+        "Trace(twigs, 0, 0, mirror = 1e300)", "Trace(twigs, 0, 0, mirror = -1)"})
     EXPECT_THROW((void)drawn(word), Error) << word;
 }
 

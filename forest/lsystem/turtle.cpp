@@ -27,7 +27,8 @@ struct State {
   Eigen::Matrix3d frame;                           // columns: heading, left, up
   Eigen::Vector3d step = Eigen::Vector3d::Zero();  // the direction of the last one
   double diameter = 1., tropism = 0., outward = 0., flat = 0., seek = 0., shun = 0.;
-  double shun_reach = 10.;
+  double shun_reach = 0.;
+  double spines = 0.;                                  // per µm
   double avoid = -1.;                                  // µm kept free; below 0: it goes through everything
   Eigen::Vector3d towards = Eigen::Vector3d::UnitY();  // of tropism
   Eigen::Vector3d across = Eigen::Vector3d::UnitZ();   // of flattening
@@ -133,6 +134,9 @@ class Turtle {
     const auto usual = [&](std::size_t i) {
       return parameter(i, symbol.defaults[i - std::size_t(symbol.least)]);
     };
+    const auto towards = [&](const Eigen::Vector3d& otherwise) {
+      return values.size() > 1 ? direction(parameter(1, 0.), parameter(2, 0.), parameter(3, 0.)) : otherwise;
+    };
     const auto angle = [&] { return parameter(0, grammar_.angle) * (std::numbers::pi / 180.); };
     switch (symbol.action) {
       case Action::draw:
@@ -169,13 +173,11 @@ class Turtle {
         return;
       case Action::tropism:
         state_.tropism = parameter(0, 0.);
-        if (values.size() > 1)
-          state_.towards = direction(parameter(1, 0.), parameter(2, 0.), parameter(3, 0.));
+        state_.towards = towards(Eigen::Vector3d::UnitY());
         return;
       case Action::flat:
         state_.flat = parameter(0, 0.);
-        if (values.size() > 1)
-          state_.across = direction(parameter(1, 0.), parameter(2, 0.), parameter(3, 0.));
+        state_.across = towards(Eigen::Vector3d::UnitZ());
         return;
       case Action::outward:
         state_.outward = parameter(0, 0.);
@@ -213,7 +215,7 @@ class Turtle {
         return;
       case Action::shun:
         state_.shun = parameter(0, 0.);
-        state_.shun_reach = std::max(1e-6, parameter(1, state_.shun_reach));
+        state_.shun_reach = std::max(1e-6, usual(1));
         return;
       case Action::ask_place:
         return tell(m, Eigen::Vector3d(state_.position - soma_place_));
@@ -327,6 +329,7 @@ class Turtle {
     must_be_in_world(place);
     must_be_size(state_.diameter);
     if (answers_) return;
+    if (state_.spines > 0.) bear(state_.spines * (place - from).norm());
     if (state_.node == Drawing::none) state_.node = drawn_.begin(from, start_radius, state_.pen);
     state_.node = drawn_.line(state_.node, place, start_radius, float(0.5 * state_.diameter), state_.pen);
   }
@@ -358,6 +361,8 @@ class Turtle {
 
   void trace(const Module& m) {
     const Tracing told = Tracing::told(word_.of(m));
+    if (!(told.mirror >= 0. && told.mirror <= 3. && told.mirror == std::floor(told.mirror)))
+      fail(fmt::format("Trace has mirror {:g}, which is 0, 1, 2 or 3", told.mirror));
     const lsystem::Trace &way = branch(told.sample, told.row, told.branch),
                          &calibre = branch(told.sample, told.like < 0. ? told.row : told.like, told.branch);
     TracedBranch traced(told, way, calibre, drawn_.gauge(state_.pen.gauge), state_.position,
@@ -418,9 +423,14 @@ class Turtle {
       fail("Spiny has a parameter below 0");
     constexpr double most = 100.;  // per µm: hundreds of times what any dendrite bears
     if (density > most) fail(fmt::format("Spiny({:g}) asks for more than {:g} spines per µm", density, most));
-    state_.pen.spines = 0;
+    state_.pen.spines = 0, state_.spines = density;
     if (density == 0. || answers_) return;
     state_.pen.spines = drawn_.add_spines(Spines(told));
+  }
+  void bear(double spines) {
+    constexpr double most = 1e7;  // tens of times what any neuron bears
+    if (!((borne_ += spines) <= most))
+      fail(fmt::format("Spiny asks for more than {:.0f} spines on one neuron", most));
   }
 
   // A root of one point. Somata are kept together by their soma; this keeps together what has none.
@@ -483,6 +493,7 @@ class Turtle {
   std::vector<double>* answers_ = nullptr;  // then nothing is drawn
   std::optional<Point> soma_;
   std::array<double, 4> outline_{};
+  double borne_ = 0.;  // spines, in the mean
   Eigen::Vector3d soma_place_ = Eigen::Vector3d::Zero();
   const cortex::Environment& environment_;
   Eigen::Vector3d at_;  // of the turtle's origin in the tissue

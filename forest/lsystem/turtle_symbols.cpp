@@ -14,6 +14,7 @@ constexpr auto tracing_values = std::bit_cast<std::array<double, tracing_takes>>
 
 constexpr double round_soma[] = {0., 0., 0., 0.};
 constexpr double spines_as_usual[] = {1.2, .5, .15, .3, 0.};
+constexpr double shun_as_usual[] = {10.};
 
 constexpr TurtleSymbol symbol_table[] = {
     {"F", "length, diameter", "draw a segment; it tapers to the diameter, when given", Action::draw, 0, 2},
@@ -91,8 +92,8 @@ constexpr TurtleSymbol symbol_table[] = {
     {"Shun", "strength, reach",
      "from here on bend away from the nearest soma of another cell by strength, which falls with the "
      "distance by a "
-     "factor of e within the reach; 0 ends it",
-     Action::shun, 1, 2},
+     "factor of e within the reach, 10 µm when not given; 0 ends it",
+     Action::shun, 1, 2, shun_as_usual},
     {"?P", "x, y, z", "after every step, where the turtle is here, counted from the soma", Action::ask_place,
      3, 3},
     {"?H", "x, y, z", "… and where it heads: a unit vector", Action::ask_heading, 3, 3},

@@ -132,6 +132,11 @@ TEST(Turtle, TropismBendsTowardsItsDirection) {
   EXPECT_GT((end - before).dot(end.normalized()), .99f);
 }
 
+TEST(Turtle, ADirectionThatIsNotGivenIsTheUsualOne) {
+  EXPECT_EQ(drawn("T(0.3, 1, 0, 0) T(0.2) -(40) F F F"), drawn("T(0.2) -(40) F F F"));
+  EXPECT_EQ(drawn("Flat(0.3, 1, 0, 0) Flat(0.2) &(40) F F F"), drawn("Flat(0.2) &(40) F F F"));
+}
+
 TEST(Turtle, BearsSpinesWhereItIsToldTo) {
   const Morphology m =
       drawn("Soma(10) Basal Spiny(2, 1.5, .6, .1, .2, .7) F(400) [ Spiny(0) +F(100) ] [ -F(300) ]");
@@ -182,6 +187,8 @@ TEST(Turtle, RefusesWhatItCannotDraw) {
   EXPECT_THROW(drawn("Soma(-1)"), Error);
   for (const char* too_large : {"F(1e39)", "!(1e39) F(1)", "Soma(1e39)"})
     EXPECT_THAT(refused([&] { drawn(too_large); }), ::testing::StartsWith("turtle: ")) << too_large;
+  EXPECT_THAT(refused([] { drawn("Spiny(100) F(1e15)"); }),
+              ::testing::HasSubstr("more than 10000000 spines on one neuron"));
   const Grammar g = parse("axiom: A\np: A -> F\n", "x");
   const auto word = [](std::vector<Symbol> symbols) {
     Word w;

@@ -50,7 +50,11 @@ mkdir few && cp "$(find traced -name '*.swc' | sort | head -1)" few
 refuses 'needs two such neurons' $BRAINFOREST fit few -o few.lsys
 [ ! -e few.lsys ]
 refuses 'none of the 12 neurons of traced has a section of kind axon' $BRAINFOREST fit traced --kind axon -o axon.lsys
-refuses "finds nothing in any name" $BRAINFOREST fit traced --slices nosuch -o axon.lsys
+refuses "finds nothing in any name" $BRAINFOREST fit traced --calibrate --slices nosuch -o axon.lsys
+fails_with 2 '--calibrate' $BRAINFOREST fit traced --slices nosuch -o axon.lsys
+fails_with 2 'is no name' $BRAINFOREST fit traced --model "$(printf 'a\tb')" --repo cells.db
+printf 'no repository\n' >no.db
+refuses 'no.db' $BRAINFOREST fit "$(pwd)/nobody" --model like_traced --repo no.db  # asked before anything is read
 fails_with 2 'is no number from 0.01 to 100' $BRAINFOREST fit traced --style -1 -o axon.lsys
 refuses 'its folder is not there' $BRAINFOREST fit traced -o nowhere/axon.lsys
 printf 'mine\n' >kept.lsys
@@ -86,6 +90,20 @@ for form in burke hillman; do
 done
 fails_with 2 'excludes' $BRAINFOREST fit traced --form burke --calibrate -o both.lsys
 
+# Axons that never fork keep to one tip.
+cp -r traced stubs
+for file in stubs/*-0000[02].swc; do
+  printf '%s 2 0 %s 0 .5 %s\n' 900001 -20 1 900002 -30 900001 900003 -40 900002 >>$file
+done
+$BRAINFOREST fit stubs --kind all -o stubs.lsys >/dev/null 2>&1
+grep -q '^table most_tips = 2: 1, 3: ' stubs.lsys
+$BRAINFOREST grow --grammar stubs.lsys --count 40 --seed 1 --out stubs_grown >/dev/null
+
+# A population may have any name.
+$BRAINFOREST import traced/*-0000[0-3].swc --repo cells.db --population 'mine/*' >/dev/null
+$BRAINFOREST fit --repo cells.db --population 'mine/*' --form burke -o odd.lsys >/dev/null 2>&1
+grep -qF 'title: neurons like those of mine/ ' odd.lsys
+
 # The judge grows from the model and fits the control that it must reject.
 $BRAINFOREST grow --grammar motoneuron --count 12 --seed 2 --out others >/dev/null
 $BRAINFOREST judge --model like_them.lsys --train traced --held-out others --count 10 --populations 3 --repeats 2 --features judged.csv --json >judged.json
@@ -98,3 +116,4 @@ assert [groups.count(g) for g in ("grown", "grown 2", "grown 3")] == [10, 10, 10
 assert 1 <= judged["copying"]["longest_run"] <= 3, judged["copying"]
 assert judged["controls"]["burke"]["rejected"] in (True, False)
 PY
+refuses 'judged.csv is there already' $BRAINFOREST judge --model like_them.lsys --train traced --held-out others --features judged.csv

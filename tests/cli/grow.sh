@@ -82,6 +82,10 @@ fails_with 1 'step000300.swc is there and holds something else' $BRAINFOREST gro
 fails_with 2 'out' $BRAINFOREST grow --grammar bes --repo lapse.db --time-lapse 10
 fails_with 2 '' $BRAINFOREST grow --grammar bes --out lapse --time-lapse 0
 
+refuses 'name a folder' $BRAINFOREST grow --grammar pyramidal --out cell.swc
+refuses 'name a folder' $BRAINFOREST grow --grammar pyramidal --out cells.ASC --count 3
+[ ! -e cell.swc ] && [ ! -e cells.ASC ]
+mkdir named.swc && $BRAINFOREST grow --grammar pyramidal --out named.swc >/dev/null && [ -e named.swc/pyramidal-0-00000.swc ]
 fails_with 1 'motoneuron, purkinje, pyramidal' $BRAINFOREST grow --grammar nobody --out x
 fails_with 2 '' $BRAINFOREST grow --grammar pyramidal
 fails_with 2 '' $BRAINFOREST grow --grammar pyramidal --out x --population L5
