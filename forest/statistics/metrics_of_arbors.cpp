@@ -165,7 +165,7 @@ constexpr auto table = std::to_array<Metric>({
     {"tmd_radial_long_bars", "", arbor, axes_only, per_barcode<radial_barcodes, long_bars>,
      "Bars of the same barcode at least a tenth as long as the longest.", "Kanari et al. 2018", ""},
     {"tmd_radial_entropy", "", arbor, axes_only, per_barcode<radial_barcodes, entropy>,
-     "Entropy -Σ p ln p of the same barcode, p a bar's share of the total persistence: 0 for one bar, ln n for n alike.", "Kanari et al. 2018", ""},
+     "Entropy -Σ p ln p of the same barcode, p a bar's share of the total persistence: 0 for one bar, ln n for n alike.", "Chintakunta et al. 2015", ""},
     {"tmd_path_total_persistence", "µm", arbor, axes_only, per_barcode<path_barcodes, total_persistence>,
      "Sum of the lengths of the bars of the arbor's barcode by distance along the branches from its start.", "Kanari et al. 2018", ""},
     {"tmd_path_longest_bar", "µm", arbor, axes_only, per_barcode<path_barcodes, longest_bar>,
@@ -173,7 +173,7 @@ constexpr auto table = std::to_array<Metric>({
     {"tmd_path_long_bars", "", arbor, axes_only, per_barcode<path_barcodes, long_bars>,
      "Bars of the same barcode at least a tenth as long as the longest.", "Kanari et al. 2018", ""},
     {"tmd_path_entropy", "", arbor, axes_only, per_barcode<path_barcodes, entropy>,
-     "Entropy of the same barcode, as of that by straight distance.", "Kanari et al. 2018", ""},
+     "Entropy of the same barcode, as of that by straight distance.", "Chintakunta et al. 2015", ""},
 });
 // clang-format on
 
