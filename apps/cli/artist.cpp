@@ -121,8 +121,10 @@ std::string Artist::explain(const scene::View& view, const Marks& marks, frame::
   if ((marks.names || playback_) && marks.legend && with_synapses &&
       (playback_ || view.synapses == scene::SynapseColour::sign))
     std::ranges::move(scene::synapse_legend(view.background), std::back_inserter(names));
-  if (marks.names && !playback_ && names.empty())
-    return "the colours of neurons mean nothing here, so there is no legend";
+  if (marks.names && !playback_ && names.empty() && !barred)
+    return forest_.instances().empty() && !dressing_.surfaces.empty()
+               ? "a legend names colours of neurons and values of surfaces, and there are none"
+               : "the colours of neurons mean nothing here, so there is no legend";
   if (!names.empty() && !scene::paint(image, names, view.background, barred) && marks.names)
     missing += missing.empty() ? "legend" : " nor a legend";
   return missing.empty()

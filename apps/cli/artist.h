@@ -71,6 +71,7 @@ class Artist {
   /// From now on these surfaces are in the pictures, too.
   void show(scene::Surfaces surfaces) { dressing_.surfaces = std::move(surfaces); }
   /// From now on neurons near the eye have skin, unless the view says otherwise.
+  bool shows_surfaces() const { return !dressing_.surfaces.empty(); }
   void give_skin() { dressing_.skinned = true; }
   /// From now on these synapses are in the pictures, unless the view says otherwise.
   void show(scene::Synapses synapses) { dressing_.synapses.emplace(std::move(synapses)); }

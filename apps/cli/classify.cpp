@@ -226,6 +226,7 @@ std::string report_of(const Types& t, const Sample& sample, const FeatureTable& 
 
 void run(const Options& options, Console& console) {
   must_take_files({options.csv, options.report}, true);
+  must_not_be_cells({options.csv, options.report}, options.files);
   const Sample sample = options.repo.empty() ? read_sample(options.files, {}, console)
                                              : read_sample({options.population}, options.repo, console);
   must_have_sections(sample, options.kind);
@@ -236,11 +237,6 @@ void run(const Options& options, Console& console) {
                   .seed = options.seed},
                  console.progress());
   const Given given = given_types(sample);
-  write_unless_there(
-      {{options.csv, options.csv.empty() ? "" : csv_of(t, sample, given)},
-       {options.report, options.report.empty() ? "" : report_of(t, sample, table, given, options)}},
-      options.force);
-
   console.print(json_of(t, sample, given, options));
   console.say(sentence(t, given, options));
   for (std::size_t k = 0; k < t.traits.size(); ++k)
@@ -253,6 +249,10 @@ void run(const Options& options, Console& console) {
     for (std::size_t k = 1; k <= t.division().types; ++k) header.push_back(fmt::format("type {}", k));
     console.table(header, given_rows(t, given));
   }
+  write_unless_there(
+      {{options.csv, options.csv.empty() ? "" : csv_of(t, sample, given)},
+       {options.report, options.report.empty() ? "" : report_of(t, sample, table, given, options)}},
+      options.force);
   if (!options.report.empty()) console.say(fmt::format("The report is {}", options.report.string()));
 }
 

@@ -223,6 +223,7 @@ std::string report_of(const Comparison& c, const std::array<FeatureTable, 2>& ta
 
 void run(const Options& options, Console& console) {
   must_take_files({options.csv, options.report}, true);
+  if (options.repo.empty()) must_not_be_cells({options.csv, options.report}, options.samples);
   const bool stored = !options.repo.empty();
   const std::array<Sample, 2> samples{
       read_sample({stored ? options.population : options.samples[0]}, options.repo, console),

@@ -130,9 +130,9 @@ class Pictures {
 };
 
 cortex::Volume read_pictures(const fs::path& path, const Options& options, Console& console) {
+  Pictures pictures(path, console);
   if (!(options.pixel > 0.))
     throw Error(path.string() + ": pictures do not say how large they are; give --pixel, in mm");
-  Pictures pictures(path, console);
   const cortex::Axis axis = axis_of(options.axis);
   const int across = int(axis);
   const auto [right, up] = flat_axes(axis);
@@ -393,10 +393,11 @@ void run(const Options& options, Console& console) {
   write_contour_files(stack, options.out);
   // About a quarter of its length is how large a contour is.
   if (const double size = .25 * along / double(loops); summary.pieces && 1e3 * options.tolerance > .05 * size)
-    console.warn(
-        fmt::format("curves may be {:g} mm off, which is much beside contours of about {:.2g} mm; give a "
-                    "smaller --tolerance, such as {:.1g}",
-                    options.tolerance, size / 1e3, std::max(size / 1e5, least_tolerance)));
+    console.warn(fmt::format(
+        "curves may be {:g} mm off, which is much beside contours of about {:.2g} mm; {}", options.tolerance,
+        size / 1e3,
+        size / 1e5 >= least_tolerance ? fmt::format("give a smaller --tolerance, such as {:.1g}", size / 1e5)
+                                      : "keep what was drawn by --straight"));
   console.print({{"file", options.out.string()},
                  {"sections", stack.sections.size()},
                  {"contours", loops},

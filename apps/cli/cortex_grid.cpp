@@ -163,10 +163,8 @@ void run(const Options& options, Console& console) {
   if (all) refuse_unused(options, false, options.dimensions != 2);
   constexpr int most_of_all = 100;
   if ((all || options.generator == "best") && options.steps > most_of_all)
-    throw Error(
-        fmt::format("every generator is tried, which takes minutes for more than {} steps; "
-                    "name a block and one of them",
-                    most_of_all));
+    throw Error(fmt::format("every generator is tried, which takes minutes for more than {} steps; name {}",
+                            most_of_all, all ? "a block and a --generator" : "one by --generator"));
   if (all) return compare(options, console);
   const auto [name, boundary] = block(options);
   refuse_unused(options, true, boundary.dimensions() == 3);

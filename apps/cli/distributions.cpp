@@ -227,6 +227,7 @@ std::string report_of(const SegmentFamilies& f, const SegmentValues& seen, const
 
 void run(const Options& options, Console& console) {
   must_take_files({options.grammar, options.report}, true);
+  must_not_be_cells({options.grammar, options.report}, options.files);
   const KindSet kinds = kind_set(options.kind);
   const Given by = *given_of(options.by);
   const Sample sample = options.repo.empty() ? read_sample(options.files, "", console)

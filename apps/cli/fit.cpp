@@ -124,6 +124,7 @@ Sample with_branches(Sample sample, statistics::KindSet kinds, Console& console)
 
 void run(const Options& options, Console& console) {
   must_take_files({options.out}, options.force);
+  must_not_be_cells({options.out}, options.files);
   if (std::error_code none; !options.model.empty() && std::filesystem::exists(options.repo, none))
     repository::Repository::open(options.repo, repository::Access::write);  // told before hours of work
   const bool files = !options.files.empty();

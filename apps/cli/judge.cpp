@@ -344,6 +344,9 @@ void leave_out(const Options& options, Console& console) {
 
 void run(const Options& options, Console& console) {
   must_take_files({options.features, options.report}, options.force);
+  if (options.repo.empty())
+    for (const auto* words : {&options.train, &options.held_out, &options.grown})
+      must_not_be_cells({options.features, options.report}, *words);
   if (options.held_out.empty()) return leave_out(options, console);
   const Sample train = read_sample(options.train, options.repo, console),
                held_out = read_sample(options.held_out, options.repo, console);

@@ -427,6 +427,7 @@ void list(Console& console) {
 void run(const Options& options, Console& console) {
   if (options.list) return list(console);
   must_take_files({options.csv, options.xlsx}, true);
+  must_not_be_cells({options.csv, options.xlsx}, options.files);
   if (!options.xlsx.empty() && !options.force) refuse_existing({options.xlsx});
   const Picks picks = pick(options);
   const KindSet kinds = kind_set(options.kind);

@@ -48,21 +48,22 @@ std::vector<std::uint32_t> in_areas(const ElementOptions& options,
         name, 0,
         fmt::format("has areas of {} vertices and {} has {}; give the surface they were drawn on",
                     areas.values.size(), options.labels_on.string(), surface.positions.size()));
-  std::set<float> keys;
+  std::set<std::int32_t> keys;
   for (const std::string& wanted : options.areas) {
-    const std::size_t before = keys.size();
+    bool known = false;
     for (const io::SurfaceLabel& label : areas.labels)
-      if (label.name == wanted) keys.insert(float(label.key));
-    if (keys.size() > before) continue;
+      if (label.name == wanted) known = true, keys.insert(label.key);
+    if (known) continue;
     std::vector<std::string> names;
     for (const io::SurfaceLabel& label : areas.labels) names.push_back(io::printable(label.name));
     throw InputError(name, 0,
-                     fmt::format("has no area '{}'; its areas are {}", wanted, fmt::join(names, ", ")));
+                     fmt::format("has no area '{}'; its areas, several of which are parted by blanks, are {}",
+                                 wanted, fmt::join(names, ", ")));
   }
   const std::vector<float> of = cortex::values_at(elements, surface, areas.values);
   std::vector<std::uint32_t> chosen;
   for (std::uint32_t e = 0; e < of.size(); ++e)
-    if (keys.contains(of[e])) chosen.push_back(e);
+    if (!std::isnan(of[e]) && keys.contains(std::int32_t(of[e]))) chosen.push_back(e);
   if (chosen.empty())
     throw Error(
         fmt::format("no element of {} lies in {}", options.file.string(), fmt::join(options.areas, ", ")));

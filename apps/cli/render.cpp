@@ -63,7 +63,9 @@ scene::View default_view(const scene::Targets& targets, const TargetOptions& sho
 
 // A picture without anything in it may be wanted; nobody should have to guess why it is so.
 std::string nothing_shown(const Artist& artist, const Drawn& drawn) {
-  if (artist.forest().instances().empty()) return "the forest has no neurons, so the picture shows none";
+  if (artist.forest().instances().empty())
+    return artist.shows_surfaces() ? "the picture shows nothing: the surfaces are transparent, or beside it"
+                                   : "the forest has no neurons, so the picture shows none";
   if (!drawn.segments)
     return "the picture shows nothing: no neuron that is visible lies in this view; look elsewhere by "
            "--view, or hide less";

@@ -12,6 +12,7 @@
 #include "forest/core/hash.h"
 #include "forest/core/parallel.h"
 #include "forest/core/pattern.h"
+#include "forest/io/format.h"
 #include "forest/io/workbook.h"
 #include "forest/repository/names.h"
 #include "forest/repository/repository.h"
@@ -131,6 +132,25 @@ Sample read_sample(const std::vector<std::string>& words, const std::string& rep
   if (sample.neurons.empty()) throw Error(fmt::format("{} holds no neuron; name another", sample.name));
   must_be_near(sample);
   return sample;
+}
+
+void must_not_be_cells(const std::vector<std::filesystem::path>& written,
+                       const std::vector<std::string>& words) {
+  std::error_code none;
+  const auto is_neuron = [](const std::string& extension) {
+    return std::ranges::any_of(io::formats(), [&](const io::Format& f) {
+      return std::ranges::find(f.extensions, extension) != f.extensions.end();
+    });
+  };
+  for (const fs::path& file : written)
+    for (const std::string& word : words) {
+      if (file.empty() || !fs::exists(file, none)) continue;
+      const fs::path way = fs::relative(file, word, none);
+      const bool within = fs::is_directory(word, none) && !way.empty() && *way.begin() != "..";
+      if (fs::equivalent(file, word, none) || (within && is_neuron(extension_of(file))))
+        throw Error(fmt::format("{} is a neuron that is read here, so it is not replaced; give another name",
+                                repository::escaped(file.string())));
+    }
 }
 
 void must_have_sections(const Sample& sample, const std::string& kind) {

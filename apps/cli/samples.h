@@ -31,6 +31,10 @@ struct Sample {
 /// Throws Error when one cannot be read, has a point farther away than any neuron reaches, or there is none.
 Sample read_sample(const std::vector<std::string>& words, const std::string& repo, Console& console);
 
+/// Throws Error when a file that is to be written is a neuron among those that words, files or folders, say are read.
+void must_not_be_cells(const std::vector<std::filesystem::path>& written,
+                       const std::vector<std::string>& words);
+
 /// Throws Error when no neuron has a section of the kind, a word of --kind.
 void must_have_sections(const Sample& sample, const std::string& kind);
 

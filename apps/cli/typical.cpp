@@ -132,6 +132,8 @@ std::vector<const Oddity*> telling(const Typicality& t, const FeatureTable& cell
 
 void run(const Options& options, Console& console) {
   must_take_files({options.report}, true);
+  must_not_be_cells({options.report}, options.cells);
+  if (options.repo.empty()) must_not_be_cells({options.report}, options.population);
   const Sample cells = cells_of(options, console),
                population = read_sample(options.population, options.repo, console);
   for (const Sample* sample : {&cells, &population}) must_have_sections(*sample, options.kind);

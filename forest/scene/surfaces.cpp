@@ -19,6 +19,7 @@ namespace {
 constexpr float smoothing = .055f;  // of the extent of a hemisphere: about the width of a sulcus
 constexpr int most_steps = 240;
 constexpr std::size_t map_colours = 64;
+constexpr float nearly_none = .002f;    // of the largest: so far below 0 are what is none, too
 constexpr double share_of_zeros = .01;  // of vertices: from there on they stand for "none"
 const Vec3 plain = light_of(0xD9CDBF);
 
@@ -172,7 +173,9 @@ frame::Camera Surfaces::camera(Side side, float aspect) const {
 }
 
 bool zero_means_none(std::span<const float> values) {
-  if (std::ranges::any_of(values, [](float value) { return value < 0.f; })) return false;
+  float least = 0.f, most = 0.f;
+  for (const float value : values) least = std::fmin(least, value), most = std::fmax(most, value);
+  if (-least > nearly_none * most) return false;
   const auto zeros = std::ranges::count(values, 0.f);
   return double(zeros) >= share_of_zeros * double(values.size()) && zeros > 0 &&
          std::ranges::any_of(values, [](float value) { return value > 0.f; });
@@ -183,7 +186,7 @@ void Surfaces::learn_values() {
   for (const One& one : list_) {
     const bool without_zero = zero_means_none(one.values);
     for (const float value : one.values)
-      if (std::isfinite(value) && !(without_zero && value == 0.f)) all.push_back(value);
+      if (std::isfinite(value) && !(without_zero && value <= 0.f)) all.push_back(value);
   }
   values_.reset();
   if (all.empty()) return;

@@ -34,7 +34,7 @@ struct AreaColour {
 std::vector<float> depth_below_smoothed(const Mesh& mesh, std::span<const Vec3> normals, float width);
 
 /// Whether zeros among the values on a surface stand for "none": FreeSurfer writes 0 for the thickness, area or volume of what is
-/// no cortex, such as the medial wall. So where nothing is negative and at least every hundredth vertex is exactly 0.
+/// no cortex, such as the medial wall. So where nothing is negative, but for what rounding leaves, and at least every hundredth vertex is exactly 0.
 bool zero_means_none(std::span<const float> values);
 
 /// Of arrays that a frame::Surface is made of: a number that none had before.

@@ -134,6 +134,10 @@ TEST(Surfaces, TheRangeLeavesOutWhatHasNoValue) {
   distances[7] = 0.f;
   EXPECT_FALSE(zero_means_none(distances));
   EXPECT_EQ(range_of([](std::size_t i) { return i % 3 ? 4.f : 0.f; }).first, 4.f);
+  EXPECT_GT(range_of([&](std::size_t i) { return i % 10   ? thickness(i)
+                                                 : i % 20 ? 0.f
+                                                          : -.003f; }).first,
+            .5f);
   // What a person says holds.
   surfaces.range = {0.f, 3.f};
   EXPECT_EQ(surfaces.shown_range(), std::pair(0.f, 3.f));

@@ -91,6 +91,16 @@ $BRAINFOREST query 'select 1 as one' --repo cells.db --csv /dev/full >/dev/null 
 [ "$got" = 1 ] && grep -q '/dev/full: cannot be written' err.txt
 [ -c /dev/full ] && [ -c /dev/null ]
 
+# Nor is a neuron that is measured or fitted, whatever is forced.
+md5sum traced/*.swc >neurons.txt
+for words in "measure traced --csv" "classify traced --report" "typical traced/a.swc --population traced --report" "fit traced -o" \
+  "compare traced kept --report" "distributions traced --report"; do
+  got=0
+  $BRAINFOREST $words traced/b.swc --force >out.txt 2>err.txt || got=$?
+  [ "$got" = 1 ] && grep -q 'traced/b.swc is a neuron that is read here, so it is not replaced' err.txt
+done
+md5sum -c neurons.txt >/dev/null
+
 # A pipe as input is refused at once.
 got=0
 timeout 20 $BRAINFOREST import pipe.swc --repo pipe.db >/dev/null 2>err.txt || got=$?

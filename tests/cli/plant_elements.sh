@@ -14,6 +14,7 @@ write("outer", ball(8))
 write("inner", ball(6))
 # Three areas: in front, behind, and a spot on top.
 areas("all.annot", [2 if z > 7 else 0 if y > 0 else 1 for x, y, z in ball(8)[0]], ["FA", "OC", "HA"])
+areas("some.annot", [2 if z > 7 else 0 if y > 0 else 8 for x, y, z in ball(8)[0]], ["FA", "OC", "HA"])  # none behind
 areas("small.annot", [0, 0], ["FA"])
 # Six measured layers: the fourth is thick in front and thin behind.
 for k, share in enumerate((.1, .1, .3, 0, .15, .15)):
@@ -104,7 +105,9 @@ spot = {r["element"] for r in rows if r["z"] > 7000 / 8000 * 7000}
 assert len(spot) > 20 and len(spot ^ set(of("spot.json"))) < .2 * len(spot), (len(spot), of("spot.json"))
 assert all(.5 < r["volume"] < 2 and abs(r["thickness"] - 2) < .1 and r["jacobian"] > .2 for r in rows)
 PY
-refuses "has no area 'FX'; its areas are FA, OC, HA" plant --region FX $areas --out no
+plant --region HA HA --labels some.annot --labels-on outer --scale .001 --out same --json >same.json
+told same.json "d['tissue']['elements'] == json.load(open('spot.json'))['tissue']['elements']"
+refuses "has no area 'FX'; its areas, several of which are parted by blanks, are FA, OC, HA" plant --region FX $areas --out no
 refuses 'has areas of 2 vertices and outer has 2562' plant --region FA --labels small.annot --labels-on outer --out no
 refuses 'names no areas' plant --region FA --labels layer1.txt --labels-on outer --out no
 refuses 'more than .3 mm from the surface of the areas' plant --region FA --labels all.annot --labels-on inner --out no
