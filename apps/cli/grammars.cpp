@@ -53,9 +53,13 @@ repository::TextsByName distributions_of(const lsystem::Grammar& grammar) {
   std::size_t size = 0;
   for (const lsystem::Declaration& declaration : grammar.declarations) {
     if (!declaration.draws) continue;
-    distributions.emplace_back(declaration.name, text_of(declaration, grammar));
-    if ((size += distributions.back().second.size()) > most)
-      throw InputError(grammar.file, 0, "its distributions build on one another too often; make it simpler");
+    std::string text = text_of(declaration, grammar);
+    if (size + text.size() > most)
+      text = fmt::format(
+          "# {:.0f} MB with all that it builds on, which the model has and is not repeated here\n",
+          double(text.size()) / 1e6);
+    size += text.size();
+    distributions.emplace_back(declaration.name, std::move(text));
   }
   return distributions;
 }

@@ -23,7 +23,8 @@ lsystem::Grammar find_grammar(const std::string& name_or_path);
 /// Warns of what is read otherwise than it looks.
 void tell_doubts(const lsystem::Grammar& grammar, Console& console);
 
-/// The distributions that a grammar names, each as a text that stands alone. Throws InputError when they are too large.
+/// The distributions that a grammar names, each as a text that stands alone; where they would be more than 100 MB together, of some a line
+/// that says so.
 repository::TextsByName distributions_of(const lsystem::Grammar& grammar);
 
 /// The cells that a model was fitted to, as its first lines say (`# They are a, b,` and more such lines), escaped; none when they do not.
