@@ -40,7 +40,7 @@ void add_overlay(scene::Surfaces& surfaces, const std::filesystem::path& file) {
     for (const io::SurfaceLabel& label : read.labels) {
       if (label.alpha == 0.f) continue;
       const auto byte = [&](int k) { return std::uint32_t(std::lround(255.f * label.colour[k])); };
-      areas.push_back({label.key, scene::light_of(byte(0) << 16 | byte(1) << 8 | byte(2))});
+      areas.push_back({label.key, scene::light_of(byte(0) << 16 | byte(1) << 8 | byte(2)), label.name});
     }
     surfaces.colour(read.values, areas);
   } catch (const InputError&) {

@@ -117,13 +117,15 @@ std::string Artist::explain(const scene::View& view, const Marks& marks, frame::
   std::vector<scene::LegendEntry> names;
   if (marks.names && colouring_ && !playback_)
     names = colouring_->legend;  // else the simulation's colours are shown
+  if (marks.names && dressing_.surfaces.visibility > 0.f)
+    std::ranges::copy(dressing_.surfaces.legend(), std::back_inserter(names));
   const bool with_synapses = !dressing_.chosen.balls.empty() && view.synapses != scene::SynapseColour::none;
   if ((marks.names || playback_) && marks.legend && with_synapses &&
       (playback_ || view.synapses == scene::SynapseColour::sign))
     std::ranges::move(scene::synapse_legend(view.background), std::back_inserter(names));
   if (marks.names && !playback_ && names.empty() && !barred)
     return forest_.instances().empty() && !dressing_.surfaces.empty()
-               ? "a legend names colours of neurons and values of surfaces, and there are none"
+               ? "a legend names colours of neurons, areas and values, and there are none"
                : "the colours of neurons mean nothing here, so there is no legend";
   if (!names.empty() && !scene::paint(image, names, view.background, barred) && marks.names)
     missing += missing.empty() ? "legend" : " nor a legend";

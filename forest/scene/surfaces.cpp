@@ -5,6 +5,7 @@
 #include <atomic>
 #include <bitset>
 #include <cmath>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -120,6 +121,13 @@ void Surfaces::colour(std::span<const float> keys, std::span<const AreaColour> a
     places.emplace_back(area.key, std::uint16_t(1 + std::min<std::size_t>(at, 0xfffe)));
   }
   std::ranges::sort(places);
+  std::set<float> met;
+  for (const float key : keys)
+    if (!std::isnan(key)) met.insert(key);
+  for (const AreaColour& area : areas)
+    if (!area.name.empty() && met.contains(float(area.key)) &&
+        std::ranges::find(legend_, area.name, &LegendEntry::name) == legend_.end())  // of both hemispheres
+      legend_.push_back({area.name, {area.colour}});
   for (const float key : keys) {
     const auto found =
         std::ranges::lower_bound(places, key, {}, [](const auto& p) { return float(p.first); });

@@ -14,6 +14,7 @@
 #include "forest/frame/frame.h"
 #include "forest/geometry/mesh.h"
 #include "forest/scene/colour_map.h"
+#include "forest/scene/colouring.h"
 
 namespace forest::scene {
 
@@ -26,6 +27,7 @@ enum class Side : std::uint8_t { left, right, front, back, above, below };
 struct AreaColour {
   std::int32_t key = 0;
   Vec3 colour = Vec3::Constant(.7f);  // linear light
+  std::string name = {};
 };
 
 /// How deep below its smoothed surface every vertex lies, in units of the smoothing: negative on gyri, positive in sulci, 0
@@ -53,6 +55,8 @@ class Surfaces {
   const Bounds& bounds() const { return bounds_; }
   std::size_t triangles() const;
   bool has_values() const;  // that colour one of them by `map`
+  /// The named areas that any vertex lies in, in their order.
+  const std::vector<LegendEntry>& legend() const { return legend_; }
   /// The view from a side in which all of it is as large as fits.
   /// @param aspect  width of the picture over its height
   frame::Camera camera(Side side, float aspect) const;
@@ -90,6 +94,7 @@ class Surfaces {
 
   std::vector<One> list_;
   std::vector<Vec3> area_colours_;
+  std::vector<LegendEntry> legend_;
   std::vector<frame::Surface> shown_;
   Bounds bounds_;
   struct Values {  // of all that are some

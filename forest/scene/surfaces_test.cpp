@@ -92,7 +92,7 @@ TEST(Surfaces, AreasHaveTheirColours) {
   surfaces.add(mesh);
   std::vector<float> keys;
   for (const Vec3& p : mesh.positions) keys.push_back(p.z() > 0.f ? 7.f : p.x() > 0.f ? -2.f : 3.f);
-  const std::vector<AreaColour> areas{{7, {1, 0, 0}}, {-2, {0, 0, 1}}};
+  const std::vector<AreaColour> areas{{7, {1, 0, 0}, "FA"}, {-2, {0, 0, 1}, "FB"}, {9, {0, 1, 0}, "none"}};
   surfaces.colour(keys, areas);
   frame::Frame frame;
   surfaces.show(frame, Colouring{}, false);
@@ -100,9 +100,12 @@ TEST(Surfaces, AreasHaveTheirColours) {
     const Vec3 colour = frame.palette[frame.surfaces[0].entries[i]];
     EXPECT_EQ(colour, keys[i] == 7.f ? Vec3(1, 0, 0) : keys[i] == -2.f ? Vec3(0, 0, 1) : light_of(0xD9CDBF));
   }
+  ASSERT_EQ(surfaces.legend().size(), 2u);  // of those that are there
+  EXPECT_EQ(surfaces.legend()[0].name, "FA");
+  EXPECT_EQ(surfaces.legend()[1].colours, std::vector<Vec3>{Vec3(0, 0, 1)});
   // More colours than a picture has.
   std::vector<AreaColour> many;
-  for (int i = 0; i < 200; ++i) many.push_back({i, Vec3::Constant(float(i) / 200.f)});
+  for (int i = 0; i < 200; ++i) many.push_back({i, Vec3::Constant(float(i) / 200.f), ""});
   surfaces.colour(keys, many);
   EXPECT_THROW(surfaces.show(frame, Colouring{}, false), Error);
 }
