@@ -306,19 +306,18 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
   refuse_uncertified(file.cortex.elements, all.elements, options.file);
   const auto measured = measured_borders(options, recipe, file.cortex.elements);
   double mean = circuit::mean_density(recipe), scale = options.scale;
-  if (!(mean > 0.)) throw Error("no layer of the recipe has neurons; give one a density");
-  if (measured) {
-    std::vector<double> volumes(recipe.layers.size(), 0.);
-    for (const std::uint32_t e : all.elements) {
-      const cortex::Borders borders = measured->of(file.cortex.elements, e);
-      for (std::size_t l = 0; l < volumes.size(); ++l) volumes[l] += borders.volume(elements[e], l);
+  if (options.density > 0.) {
+    if (measured) {
+      std::vector<double> volumes(recipe.layers.size(), 0.);
+      for (const std::uint32_t e : all.elements) {
+        const cortex::Borders borders = measured->of(file.cortex.elements, e);
+        for (std::size_t l = 0; l < volumes.size(); ++l) volumes[l] += borders.volume(elements[e], l);
+      }
+      mean = circuit::mean_density(recipe, volumes);
     }
-    mean = circuit::mean_density(recipe, volumes);
+    if (!(mean > 0.)) throw Error("no layer that is there has neurons; give one a density");
+    scale = options.density / mean;
   }
-  if (options.density > 0. && !(mean > 0.))
-    throw Error(
-        "no layer that has neurons by the recipe was measured there; leave --density or --layers out");
-  if (options.density > 0.) scale = options.density / mean;
   // Far too many are told before anything is loaded; how many exactly follows from the borders of layers.
   std::vector<double> volumes(all.elements.size());
   parallel_for(volumes.size(), 64,
