@@ -11,6 +11,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
+#include "forest/geometry/split_areas.h"
 #include "forest/scene/colouring.h"
 #include "forest/scene/view.h"
 
@@ -81,30 +82,27 @@ std::vector<float> depth_below_smoothed(const Mesh& mesh, std::span<const Vec3> 
 }
 
 void Surfaces::add(Mesh mesh, float opacity) {
-  One one;
-  one.normals = vertex_normals(mesh);
+  Shape shape{.mesh = {}, .normals = vertex_normals(mesh), .openness = {}};
   Bounds extent;
   for (const Vec3& p : mesh.positions) extent.add(p);
   if (!extent.empty()) bounds_.add(extent.low), bounds_.add(extent.high);
   const float width = extent.empty() ? 0.f : smoothing * extent.extent().maxCoeff() * .5f;
-  for (const float depth : depth_below_smoothed(mesh, one.normals, width)) {
+  for (const float depth : depth_below_smoothed(mesh, shape.normals, width)) {
     // Bright on gyri, falling within half the smoothing to a third in the depth of sulci.
     const float t = std::clamp(.45f + .9f * depth, 0.f, 1.f);
-    one.openness.push_back(std::uint8_t(255.f * (1.f - .62f * t * t * (3.f - 2.f * t))));
+    shape.openness.push_back(std::uint8_t(255.f * (1.f - .62f * t * t * (3.f - 2.f * t))));
   }
-  one.mesh = std::move(mesh);
-  one.opacity = opacity;
-  one.version = next_version();
-  list_.push_back(std::move(one));
+  shape.mesh = std::move(mesh);
+  list_.push_back({.given = std::move(shape), .opacity = opacity});
 }
 
 void Surfaces::colour(std::span<const float> values) {
   One& one = list_.back();
-  if (values.size() != one.mesh.positions.size())
+  if (values.size() != one.given.mesh.positions.size())
     throw Error(
         fmt::format("there are {} values and the surface has {} vertices; give the values of this surface",
-                    values.size(), one.mesh.positions.size()));
-  one.values.assign(values.begin(), values.end()), one.areas.clear();
+                    values.size(), one.given.mesh.positions.size()));
+  one.values.assign(values.begin(), values.end()), one.split.reset();
   learn_values();
 }
 
@@ -128,12 +126,20 @@ void Surfaces::colour(std::span<const float> keys, std::span<const AreaColour> a
     if (!area.name.empty() && met.contains(float(area.key)) &&
         std::ranges::find(legend_, area.name, &LegendEntry::name) == legend_.end())  // of both hemispheres
       legend_.push_back({area.name, {area.colour}});
+  std::vector<std::uint16_t> of;
   for (const float key : keys) {
     const auto found =
         std::ranges::lower_bound(places, key, {}, [](const auto& p) { return float(p.first); });
-    one.areas.push_back(found != places.end() && float(found->first) == key ? found->second
-                                                                            : std::uint16_t(0));
+    of.push_back(found != places.end() && float(found->first) == key ? found->second : std::uint16_t(0));
   }
+  const Shape& given = one.given;
+  SplitAreas parts = split_areas(given.mesh.triangles, of);
+  Shape& split = one.split.emplace();
+  split.mesh.positions = parts.carried(std::span(given.mesh.positions));
+  split.normals = parts.carried(std::span(given.normals));
+  for (Vec3& normal : split.normals) normal = normal.norm() > 0.f ? Vec3(normal.normalized()) : Vec3::UnitY();
+  split.openness = parts.carried(std::span(given.openness));
+  split.mesh.triangles = std::move(parts.triangles), split.areas = std::move(parts.areas);
 }
 
 bool Surfaces::has_values() const {
@@ -142,7 +148,7 @@ bool Surfaces::has_values() const {
 
 std::size_t Surfaces::triangles() const {
   std::size_t sum = 0;
-  for (const One& one : list_) sum += one.mesh.triangles.size();
+  for (const One& one : list_) sum += one.given.mesh.triangles.size();
   return sum;
 }
 
@@ -169,7 +175,7 @@ frame::Camera Surfaces::camera(Side side, float aspect) const {
   const Vec3 centre = bounds_.centre();
   float distance = 0.f;
   for (const One& one : list_)
-    for (const Vec3& position : one.mesh.positions) {
+    for (const Vec3& position : one.given.mesh.positions) {
       const Vec3 at = position - centre;
       distance = std::max(distance, out.dot(at) + std::max(std::abs(right.dot(at)) / wide,
                                                            std::abs(camera.up.dot(at)) / high));
@@ -240,19 +246,20 @@ void Surfaces::show(frame::Frame& frame, const Colouring& colouring, bool playin
   const auto [low, high] = shown_range();
   shown_.clear();
   for (One& one : list_) {
-    one.entries.assign(one.mesh.positions.size(), free[0]);
-    for (std::size_t i = 0; i < one.areas.size(); ++i)
-      if (one.areas[i]) one.entries[i] = free[one.areas[i]];
+    const Shape& shape = one.shown();
+    one.entries.assign(shape.mesh.positions.size(), free[0]);
+    for (std::size_t i = 0; i < shape.areas.size(); ++i)
+      if (shape.areas[i]) one.entries[i] = free[shape.areas[i]];
     for (std::size_t i = 0; i < one.values.size(); ++i) {
       if (!std::isfinite(one.values[i])) continue;
       const float t = std::clamp((one.values[i] - low) / (high - low), 0.f, 1.f);
       one.entries[i] = entry_of_step(std::size_t(t * float(steps - 1) + .5f));
     }
     frame::Surface& s = shown_.emplace_back();
-    s.positions = one.mesh.positions, s.normals = one.normals;
-    s.entries = one.entries, s.openness = one.openness, s.triangles = one.mesh.triangles;
+    s.positions = shape.mesh.positions, s.normals = shape.normals;
+    s.entries = one.entries, s.openness = shape.openness, s.triangles = shape.mesh.triangles;
     s.opacity = std::uint8_t(std::lround(255.f * std::clamp(one.opacity * visibility, 0.f, 1.f)));
-    s.version = one.version;
+    s.version = shape.version;
   }
   frame.surfaces = shown_;
 }

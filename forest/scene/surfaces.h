@@ -48,7 +48,7 @@ class Surfaces {
   void add(Mesh mesh, float opacity = 1.f);
   /// Colours the last one by a value a vertex, NaN for none. Throws Error when there are not as many.
   void colour(std::span<const float> values);
-  /// The same by areas; values that are no key of one are none.
+  /// The same by areas; values that are no key of one are none. Triangles between areas are cut (split_areas.h).
   void colour(std::span<const float> keys, std::span<const AreaColour> areas);
 
   bool empty() const { return list_.empty(); }
@@ -82,14 +82,21 @@ class Surfaces {
  private:
   void learn_values();
 
-  struct One {
+  struct Shape {
     Mesh mesh;
     std::vector<Vec3> normals;
-    std::vector<std::uint8_t> openness, entries;
-    std::vector<float> values;         // empty: plain
-    std::vector<std::uint16_t> areas;  // 1 + index of the colour, 0 for none; empty: none
+    std::vector<std::uint8_t> openness;
+    std::vector<std::uint16_t> areas = {};  // 1 + index of the colour, 0 for none; empty: none
+    std::uint64_t version = next_version();
+  };
+  struct One {
+    Shape given;
+    std::optional<Shape> split = {};         // by areas, so that their colours do not run into one another
+    std::vector<float> values = {};          // of the vertices that were given; empty: plain
+    std::vector<std::uint8_t> entries = {};  // of the vertices that are shown
     float opacity = 1.f;
-    std::uint64_t version = 0;
+
+    const Shape& shown() const { return split ? *split : given; }
   };
 
   std::vector<One> list_;

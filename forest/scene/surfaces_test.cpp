@@ -100,6 +100,11 @@ TEST(Surfaces, AreasHaveTheirColours) {
     const Vec3 colour = frame.palette[frame.surfaces[0].entries[i]];
     EXPECT_EQ(colour, keys[i] == 7.f ? Vec3(1, 0, 0) : keys[i] == -2.f ? Vec3(0, 0, 1) : light_of(0xD9CDBF));
   }
+  for (const Triangle& t : frame.surfaces[0].triangles) {  // no colours that no area has
+    EXPECT_EQ(frame.surfaces[0].entries[t[0]], frame.surfaces[0].entries[t[1]]);
+    EXPECT_EQ(frame.surfaces[0].entries[t[0]], frame.surfaces[0].entries[t[2]]);
+  }
+  EXPECT_NO_THROW(frame::check(frame.surfaces[0], {}));
   ASSERT_EQ(surfaces.legend().size(), 2u);  // of those that are there
   EXPECT_EQ(surfaces.legend()[0].name, "FA");
   EXPECT_EQ(surfaces.legend()[1].colours, std::vector<Vec3>{Vec3(0, 0, 1)});
