@@ -12,31 +12,46 @@
 #include "forest/core/file.h"
 #include "forest/core/lower.h"
 #include "forest/io/format.h"
+#include "forest/scene/gallery.h"
 
 namespace forest {
 namespace {
 
-// Each beside the one before it.
-scene::Forest side_by_side(const std::vector<Morphology>& neurons, std::vector<std::string> names) {
-  constexpr float apart = 50.f;  // µm
-  circuit::Circuit circuit;
-  circuit.name = names.size() == 1 ? names[0] : "neurons";
-  circuit.layers = {{"traced", -1.f, 1.f}};
-  float right = 0.f;
-  for (std::size_t i = 0; i < neurons.size(); ++i) {
-    const Bounds box = neurons[i].bounds();
-    const Vec3 soma = neurons[i].soma().sphere().position();
-    const float left = box.empty() ? 0.f : box.low.x() - soma.x(),
-                wide = box.empty() ? 0.f : box.extent().x();
-    circuit::Instance instance;
-    instance.position.x() = i == 0 ? 0.f : right + apart - left;
-    right = instance.position.x() + left + wide;
-    instance.morphology = instance.type = std::uint32_t(i);
-    circuit.instances.push_back(instance);
-    circuit.types.push_back({names[i], "traced"});
+constexpr std::size_t most = 100;
+
+struct Cells {
+  std::vector<Morphology> neurons;
+  std::vector<std::string> names;
+
+  void add(const std::filesystem::path& file) {
+    const MappedFile bytes(file);
+    const io::CellReader cells =
+        io::read_each(io::format_of(file, bytes.text()), bytes.text(), file.string());
+    if (neurons.size() + cells.count > most)
+      throw InputError(file.string(), 0,
+                       fmt::format("makes {} neurons, and at most {} are shown side by side; plant them by a "
+                                   "recipe and give the forest of 'brainforest pack'",
+                                   neurons.size() + cells.count, most));
+    for (std::size_t i = 0; i < cells.count; ++i) {
+      io::Cell cell = cells.read(i);
+      const std::string name = cell.name.empty() ? file.stem().string() : cell.name;
+      std::string own = name;
+      for (std::size_t k = 2; std::ranges::find(names, own) != names.end(); ++k)
+        own = fmt::format("{} ({})", name, k);
+      names.push_back(std::move(own)), neurons.push_back(std::move(cell.read.morphology));
+    }
   }
-  circuit.morphologies = std::move(names);
-  return scene::Forest::from_bytes(scene::pack(circuit, neurons));
+};
+
+// Those that lie in it, by name.
+std::vector<std::filesystem::path> cells_in(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    if (entry.is_regular_file() && holds_cells(entry.path())) files.push_back(entry.path());
+  std::ranges::sort(files);
+  if (files.empty())
+    throw InputError(folder.string(), 0, "holds no file of neurons; give one that does, or a forest file");
+  return files;
 }
 
 }  // namespace
@@ -48,25 +63,25 @@ bool holds_cells(const std::filesystem::path& file) {
   });
 }
 
-scene::Forest open_forest(const std::filesystem::path& file) {
-  if (!holds_cells(file)) return scene::Forest::open(file);
-  constexpr std::size_t most = 100;
-  const MappedFile bytes(file);
-  const io::CellReader cells = io::read_each(io::format_of(file, bytes.text()), bytes.text(), file.string());
-  if (cells.count > most)
-    throw InputError(file.string(), 0,
-                     fmt::format("holds {} neurons, and at most {} are shown side by side; plant them by a "
-                                 "recipe and give the forest of 'brainforest pack'",
-                                 cells.count, most));
-  std::vector<Morphology> neurons;
-  std::vector<std::string> names;
-  for (std::size_t i = 0; i < cells.count; ++i) {
-    io::Cell cell = cells.read(i);
-    std::string name = cell.name.empty() ? file.stem().string() : cell.name;
-    if (std::ranges::find(names, name) != names.end()) name += fmt::format(" ({})", i + 1);
-    names.push_back(std::move(name)), neurons.push_back(std::move(cell.read.morphology));
-  }
-  return side_by_side(neurons, std::move(names));
+bool are_cells(std::span<const std::filesystem::path> files) {
+  std::error_code none;
+  return files.size() > 1 || std::filesystem::is_directory(files.front(), none) || holds_cells(files.front());
 }
+
+scene::Forest open_forest(std::span<const std::filesystem::path> files, float aspect) {
+  if (!are_cells(files)) return scene::Forest::open(files.front());
+  Cells cells;
+  std::error_code none;
+  for (const std::filesystem::path& file : files)
+    if (std::filesystem::is_directory(file, none))
+      for (const std::filesystem::path& one : cells_in(file)) cells.add(one);
+    else if (holds_cells(file) || !std::filesystem::exists(file, none))
+      cells.add(file);
+    else
+      throw InputError(file.string(), 0, "is no file of neurons; only such are shown beside one another");
+  return scene::gallery(cells.neurons, std::move(cells.names), aspect);
+}
+
+scene::Forest open_forest(const std::filesystem::path& file) { return open_forest(std::span(&file, 1)); }
 
 }  // namespace forest

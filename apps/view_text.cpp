@@ -31,7 +31,7 @@ scene::View read_view(const std::string& file_or_text, const Vec3& up, const sce
   return view_of(file.text(), file_or_text, up, whole);
 }
 
-std::vector<scene::View> read_views(const std::string& name, const Vec3& up) {
+std::vector<scene::View> read_views(const std::string& name, const Vec3& up, const scene::View* whole) {
   const MappedFile file(name);
   std::string_view text = file.text();
   std::vector<scene::View> views;
@@ -41,7 +41,7 @@ std::vector<scene::View> read_views(const std::string& name, const Vec3& up) {
     text.remove_prefix(std::min(end + 1, text.size()));
     if (row.find_first_not_of(" \t\r") == row.npos) continue;
     try {
-      views.push_back(view_of(row, name, up));
+      views.push_back(view_of(row, name, up, whole));
     } catch (const InputError& error) {
       throw InputError(name, line, error.sentence());
     }

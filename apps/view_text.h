@@ -18,6 +18,7 @@ scene::View view_of(std::string_view text, const std::string& name, const Vec3& 
 scene::View read_view(const std::string& file_or_text, const Vec3& up, const scene::View* whole = nullptr);
 
 /// Views one after the other, as the studio records them: one on each line of the file. Throws InputError with the line.
-std::vector<scene::View> read_views(const std::string& file, const Vec3& up);
+std::vector<scene::View> read_views(const std::string& file, const Vec3& up,
+                                    const scene::View* whole = nullptr);
 
 }  // namespace forest

@@ -3,6 +3,8 @@
 
 #include <cmath>
 #include <cstdio>
+#include <map>
+#include <string>
 
 #include <CLI/App.hpp>
 #include <fmt/format.h>
@@ -11,9 +13,11 @@
 #include "forest/io/film.h"
 #include "forest/io/png.h"
 #include "forest/scene/colour_bar.h"
+#include "forest/scene/gallery.h"
 #include "forest/scene/scale_bar.h"
 #include "forest/scene/slice_picture.h"
 
+#include "apps/choice.h"
 #include "apps/cli/clock.h"
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
@@ -108,6 +112,7 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
 std::string Artist::explain(const scene::View& view, const Marks& marks, frame::Image& image) const {
   std::string missing;
   if (marks.scale && !scene::paint_scale(image, view.camera, view.background)) missing = "scale bar";
+  if (marks.names && scene::is_gallery(forest_)) scene::paint_names(image, forest_, view);
   std::vector<scene::ColourBar> bars;
   if (marks.legend && playback_)
     bars.push_back(scene::bar_of(*playback_, view.activity.value_or(playback_->view()), view.background));
@@ -169,6 +174,7 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
   progress.begin("filming", std::size_t(count));
   for (int i = 0; i < count; ++i) {
     scene::View view = path.at(count > 1 ? float(i) / float(count - 1) : 0.f);
+    plan.look.put_on(view);
     view.targets.insert(view.targets.end(), plan.targets.begin(), plan.targets.end());
     view.samples = plan.samples.value_or(artist.sees_through(view) ? 32 : 8);
     if (plan.synapses) view.synapses = *plan.synapses;
@@ -220,6 +226,24 @@ void play(Artist& artist, const ActivityOptions& options, scene::View& view, Con
     throw Error(fmt::format("{}: holds no time {:g} ms; it runs from {:g} to {:g} ms", options.file.string(),
                             time, playback.begin(), playback.end()));
   view.activity->time = time;
+}
+
+void add_look(CLI::App& command, Look& look) {
+  static const std::map<std::string, scene::Background> backgrounds{{"dark", scene::Background::dark},
+                                                                    {"light", scene::Background::light}};
+  static const std::map<std::string, scene::ColourBy> colours{
+      {"type", scene::ColourBy::type},     {"layer", scene::ColourBy::layer},
+      {"kind", scene::ColourBy::kind},     {"neuron", scene::ColourBy::neuron},
+      {"target", scene::ColourBy::target}, {"depth", scene::ColourBy::depth}};
+  command
+      .add_option("--background", look.background, "What lies behind; by default as the view says, or dark")
+      ->transform(one_of(backgrounds))
+      ->option_text("dark|light");
+  command
+      .add_option("--colour-by", look.colour_by,
+                  "What the colours of neurons mean; by default as the view says")
+      ->transform(one_of(colours))
+      ->option_text("type|layer|kind|neuron|target|depth");
 }
 
 void add_marks(CLI::App& command, Marks& marks) {

@@ -46,6 +46,17 @@ struct Marks {
   bool scale = false;  // how long some µm are
 };
 
+/// What many would change of a view, and nothing else.
+struct Look {
+  std::optional<scene::Background> background;
+  std::optional<scene::ColourBy> colour_by;
+
+  void put_on(scene::View& view) const {
+    if (background) view.background = *background;
+    if (colour_by) view.colour_by = *colour_by;
+  }
+};
+
 class Artist {
  public:
   /// @param sets  names that targets of views may use
@@ -117,6 +128,7 @@ struct FilmPlan {
   std::optional<scene::Scanpath> gaze;  // replayed from its begin; none: that of the views
   std::filesystem::path pictures;       // when not empty: a folder for the single pictures as PNG files
   Marks marks{.legend = false};
+  Look look;
   bool outline = false;                          // of the column or the elements
   std::vector<scene::Appearance> targets;        // after those of the path's views
   std::optional<scene::SynapseColour> synapses;  // none: as the path's views say
@@ -140,6 +152,8 @@ void add_activity(CLI::App& command, ActivityOptions& options, const char* name,
 /// Error when it is not, or when the activity is of another circuit. Says so when there is nothing to see in it.
 void play(Artist& artist, const ActivityOptions& options, scene::View& view, Console& console);
 
+/// --background and --colour-by.
+void add_look(CLI::App& command, Look& look);
 /// --no-legend and --scale.
 void add_marks(CLI::App& command, Marks& marks);
 

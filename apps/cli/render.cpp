@@ -82,7 +82,9 @@ std::string nothing_shown(const Artist& artist, const Drawn& drawn) {
 
 std::function<void()> render(CLI::App& command, Console& console) {
   struct Options {
-    std::filesystem::path forest, out;
+    std::vector<std::filesystem::path> forest;
+    std::filesystem::path out;
+    Look look;
     std::string view, size = "1920x1080";
     std::vector<float> gaze;
     bool outline = false;
@@ -96,16 +98,21 @@ std::function<void()> render(CLI::App& command, Console& console) {
     ActivityOptions activity;
   };
   const auto options = std::make_shared<Options>();
-  command.add_option("forest", options->forest, "Forest file, or the surface of a cortex")->required();
-  auto* one_view = command.add_option("--view", options->view, view_help);
+  command
+      .add_option(
+          "forest", options->forest,
+          "Forest file, or traced neurons: files or folders of them, side by side; or the surface of a "
+          "cortex")
+      ->required();
+  command.add_option("--view", options->view, view_help);
+  add_look(command, options->look);
   add_surfaces(command, options->surfaces);
   command.add_flag("--skin", options->skin,
                    "Neurons near the eye have a smooth skin and spines (takes seconds)");
   add_synapses(command, options->synapses);
   command.add_option("--from", options->side, "Show all of the surfaces, from this side of the brain")
       ->transform(one_of(sides))
-      ->option_text("left|right|front|back|above|below")
-      ->excludes(one_view);
+      ->option_text("left|right|front|back|above|below");
   add_targets(command, options->targets);
   add_activity(command, options->activity, "--time",
                "Its moment that is shown, ms; by default the first, of spikes alone the busiest");
@@ -126,7 +133,9 @@ std::function<void()> render(CLI::App& command, Console& console) {
     must_take(options->out, png_picture);
     const auto [width, height] = parse_size(options->size);
     SurfaceOptions named = options->surfaces;
-    const bool alone = is_surface(options->forest);
+    const float aspect = float(width) / float(height);
+    const std::filesystem::path& first = options->forest.front();
+    const bool alone = options->forest.size() == 1 && is_surface(first);
     const char* of_neurons = options->skin                    ? "--skin"
                              : options->outline               ? "--outline"
                              : !options->targets.only.empty() ? "--only"
@@ -135,21 +144,23 @@ std::function<void()> render(CLI::App& command, Console& console) {
     if (alone && of_neurons)
       throw Error(
           fmt::format("{} is of neurons, and {} is a surface; name a forest file, and that by --surface",
-                      of_neurons, options->forest.string()));
-    if (alone) named.files.insert(named.files.begin(), options->forest);
+                      of_neurons, first.string()));
+    if (alone) named.files.insert(named.files.begin(), first);
     scene::Surfaces surfaces = read_surfaces(named, console);
-    const scene::Forest forest = alone ? empty_forest() : open_forest(options->forest);
+    const scene::Forest forest = alone ? empty_forest() : open_forest(options->forest, aspect);
     Artist artist(forest, options->drawer, read_node_sets(forest, options->targets.node_sets, console));
     const auto outline = options->outline ? scene::outline(forest) : std::vector<frame::Overlay>();
     if (options->outline && outline.empty())
       console.warn("the forest is neither a column nor planted in elements, so it has no outline");
-    scene::View view = default_view(artist.targets(), options->targets, surfaces, options->side,
-                                    float(width) / float(height), outline);
-    if (!alone && holds_cells(options->forest)) {
-      view.samples = 64;  // thin lines on nothing
-      if (forest.instances().size() == 1) view.colour_by = scene::ColourBy::kind;
+    scene::View view =
+        default_view(artist.targets(), options->targets, surfaces, options->side, aspect, outline);
+    if (!options->view.empty()) {
+      const frame::Camera from = view.camera;
+      view = read_view(options->view, forest.circuit().up, &view);
+      if (options->side && (view.camera.eye != from.eye || view.camera.target != from.target))
+        throw Error("--from and the view both say where the eye is; leave one of them out");
     }
-    if (!options->view.empty()) view = read_view(options->view, forest.circuit().up, &view);
+    options->look.put_on(view);
     add_appearances(options->targets, view.targets);
     nlohmann::ordered_json of_surfaces;  // null where there are none
     if (!surfaces.empty()) of_surfaces["triangles"] = surfaces.triangles();
@@ -161,8 +172,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
     warn_of_empty(artist.targets(), view.targets, console);
     artist.show(std::move(surfaces));
     if (options->skin) artist.give_skin();
-    if (auto synapses = open_synapses(options->synapses, options->forest, forest))
-      artist.show(std::move(*synapses));
+    if (auto synapses = open_synapses(options->synapses, first, forest)) artist.show(std::move(*synapses));
     if (options->synapses.colour) view.synapses = *options->synapses.colour;
     play(artist, options->activity, view, console);
     view.samples = artist.still_samples(view);
@@ -198,7 +208,8 @@ std::function<void()> render(CLI::App& command, Console& console) {
 
 std::function<void()> movie(CLI::App& command, Console& console) {
   struct Options {
-    std::filesystem::path forest, out;
+    std::vector<std::filesystem::path> forest;
+    std::filesystem::path out;
     std::vector<std::string> views;
     std::string path, scanpath;
     std::string size = "1280x720";
@@ -212,11 +223,15 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     std::optional<double> rate;
   };
   const auto options = std::make_shared<Options>();
-  command.add_option("forest", options->forest, "Forest file")->required();
-  command.add_option(
-      "--view", options->views,
-      "Key views, two or more, as JSON files or texts; by default a walk into the forest. With "
-      "--activity one is enough: the eye stands still");
+  command
+      .add_option("forest", options->forest,
+                  "Forest file, or traced neurons: files or folders of them, side by side")
+      ->required();
+  add_look(command, options->plan.look);
+  command.add_option("--view", options->views,
+                     "Key views, two or more, as JSON files or texts; by default a walk into the forest, or "
+                     "around traced neurons. With "
+                     "--activity one is enough: the eye stands still");
   add_activity(command, options->activity, "--from",
                "Its moment at the first picture, ms; by default the first");
   must_be_within(
@@ -258,10 +273,13 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     must_take(options->out, mp4_film);
     FilmPlan plan = options->plan;
     std::tie(plan.width, plan.height) = parse_size(options->size);
-    const scene::Forest forest = open_forest(options->forest);
+    const float aspect = float(plan.width) / float(plan.height);
+    const scene::Forest forest = open_forest(options->forest, aspect);
+    const scene::View whole = scene::overview(forest, aspect);
     std::vector<scene::View> views;
-    for (const std::string& view : options->views) views.push_back(read_view(view, forest.circuit().up));
-    if (!options->path.empty()) views = read_views(options->path, forest.circuit().up);
+    for (const std::string& view : options->views)
+      views.push_back(read_view(view, forest.circuit().up, &whole));
+    if (!options->path.empty()) views = read_views(options->path, forest.circuit().up, &whole);
     if (!options->scanpath.empty())
       plan.gaze = scene::parse_scanpath(MappedFile(options->scanpath).text(), options->scanpath);
     const bool playing = !options->activity.file.empty();
@@ -273,21 +291,21 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     warn_of_empty(artist.targets(), plan.targets, console);
     artist.show(read_surfaces(options->surfaces, console));
     if (options->skin) artist.give_skin();
-    if (auto synapses = open_synapses(options->synapses, options->forest, forest))
+    if (auto synapses = open_synapses(options->synapses, options->forest.front(), forest))
       artist.show(std::move(*synapses));
     plan.synapses = options->synapses.colour;
     std::optional<scene::View> look;
     if (playing) {
-      look = views.empty() ? scene::overview(forest) : views.front();
+      look = views.empty() ? whole : views.front();
       const bool told = options->activity.time || (look->activity && look->activity->time);
       play(artist, options->activity, *look, console);
       if (!told) look->activity->time = artist.playback()->begin();  // all of it
       plan.from = *look->activity->time;
       plan.rate = options->rate.value_or((artist.playback()->end() - plan.from) / plan.seconds);
     }
-    const scene::CameraPath path = views.empty()
-                                       ? scene::walk(forest, states_of(artist.targets(), options->targets))
-                                       : scene::CameraPath(std::move(views));
+    const scene::CameraPath path =
+        views.empty() ? scene::walk(forest, states_of(artist.targets(), options->targets), aspect)
+                      : scene::CameraPath(std::move(views));
     const FilmFigures figures =
         film(artist, path, plan, options->out, console.progress(), look ? look->activity : std::nullopt);
     if (figures.covered == 0.)

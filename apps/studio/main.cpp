@@ -113,7 +113,7 @@ int run(const Options& options, int& argc, char** argv) {
       scene::overview(forest, float(std::max(200, about.width() - 340)) / float(about.height() - 40));
   view.camera.near = .5f;
   if (alone) view.camera = surfaces.camera(surfaces.outside(), 1.6f), view.fog = 0.f;
-  if (!options.view.empty()) view = read_view(options.view, forest.circuit().up);
+  if (!options.view.empty()) view = read_view(options.view, forest.circuit().up, &view);
   std::optional<scene::Playback> playback;
   if (!options.activity.empty()) playback.emplace(scene::Playback::open(forest, options.activity));
   std::optional<scene::Synapses> synapses = synapses_of(options, forest);

@@ -36,6 +36,7 @@ Constants constants_of(const Frame& f, std::uint32_t subframe) {
   c.bottom_red = s.background_bottom.x(), c.bottom_green = s.background_bottom.y(),
   c.bottom_blue = s.background_bottom.z();
   c.thinnest = f.subframes == 1 ? std::max(f.thinnest, 1.f) : f.thinnest;
+  c.least_radius = .5f * f.least_width;
   c.fog_length = s.fog_length, c.exposure = s.exposure;
   c.converge = f.camera.orthographic() ? 0.f : 1.f, c.parallel = 1.f - c.converge;
   if (f.glass) {

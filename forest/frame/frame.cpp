@@ -54,6 +54,8 @@ void check(const Frame& frame, const Geometry& geometry) {
   require(frame.unwanted.empty() || frame.unwanted.size() == squares(frame.width) * squares(frame.height),
           "every square of a picture is wanted or not");
   require(frame.thinnest >= 0.f && frame.thinnest <= 64.f, "the thinnest lines must be 0 to 64 pixels wide");
+  require(frame.least_width >= 0.f && frame.least_width <= 4.f,
+          "branches can be drawn no thinner than 0 to 4 pixels");
   require(frame.gaps >= 0.f && frame.gaps < 1.f, "the share of gaps must be at least 0 and less than 1");
   require(frame.subframes > 0 && frame.subframes <= 1024, "there must be 1 to 1024 subframes");
   require(frame.first_subframe < std::min(frame.subframes, frame.last_subframe),

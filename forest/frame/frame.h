@@ -187,6 +187,7 @@ struct Frame : Lists {
   // Lines thinner than this are drawn as wide, for their like: so few of them are in a frame's lists that they cover their
   // area on the mean; pixels, and 1 for a picture of a single subframe.
   float thinnest = 0.f;
+  float least_width = 0.f;   // pixels: branches and somata are drawn no thinner, however many; 0–4
   std::optional<Area> area;  // only these pixels are wanted, the others may show anything; none: all of them
   // Of them, 1 for each square of FOREST_TILE pixels of which nothing is wanted either, in rows from the upper left corner of the
   // picture; none: every square is.

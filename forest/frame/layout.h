@@ -77,6 +77,7 @@ struct Constants {
   uint opacity, door;                        // 0–255, of the surface drawn, and the key of its screen door
   float glass_red, glass_green, glass_blue;  // linear light
   uint instance;                             // of the surface drawn; all ones: it lies in the world
+  float least_radius, unused_1, unused_2, unused_3;  // pixels; what has a neuron is drawn no thinner
 };
 
 // A pixel's key: depth (20 bits, logarithmic), palette entry (7 bits), shade (5 bits). The smallest key wins, so the
@@ -172,7 +173,7 @@ FOREST_SHARED uint forest_side_key(uint surface_key, bool front, uint pixel) {
 
 #ifdef __cplusplus
 static_assert(sizeof(Segment) == 32 && sizeof(Instance) == 32 && sizeof(Item) == 32 && sizeof(Vertex) == 32 &&
-              sizeof(Constants) == 256);
+              sizeof(Constants) == 272);
 inline constexpr uint cluster_size = FOREST_CLUSTER_SIZE;
 /// Item::drawn of all of so many segments, of cluster_size when they are more.
 constexpr uint first_segments(std::uint64_t count) { return count < 32 ? (1u << count) - 1u : 0xffffffffu; }

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "forest/core/round_numbers.h"
 #include "forest/scene/playback.h"
 #include "forest/scene/surfaces.h"
 
@@ -33,15 +34,6 @@ float marks_width(const ColourBar& bar, float letter) {
 float thick_of(const ColourBar& bar) { return bar.map ? thick : 0.f; }
 std::string note_of(const ActivityView& activity) {
   return fmt::format("a spike, then fading, {:g} µm/ms", activity.speed);
-}
-// The text, or as much of its beginning as has room.
-std::string shortened(const Lettering& letters, std::string text, float room) {
-  if (letters.width(text) <= room) return text;
-  while (!text.empty() && letters.width(text + "…") > room) {
-    while ((static_cast<unsigned char>(text.back()) & 0xc0) == 0x80) text.pop_back();
-    text.pop_back();
-  }
-  return text + "…";
 }
 // Whether a plate of this size leaves enough of a picture.
 bool fits(const frame::Image& image, float width, float height) {
@@ -123,13 +115,19 @@ void paint(frame::Image& image, const ColourBar& bar, const Box& place, const Le
   const auto [low, high] = bar.ends();
   letters.write(image, low, place.left, base);
   letters.write(image, high, place.right - letters.width(high), base);
-  if (!bar.threshold) return;
-  const std::string border = fmt::format("{:g}", *bar.threshold);
-  const float share = (*bar.threshold - bar.low) / (bar.high - bar.low), half = .5f * letters.width(border),
-              at = place.left + share * (place.right - place.left), apart = .8f * letters.height;
-  if (at - half > place.left + letters.width(low) + apart &&
-      at + half < place.right - letters.width(high) - apart)
-    letters.write(image, border, at - half, base);
+  // Between them the threshold, or round values, where there is room.
+  const float apart = .8f * letters.height, end = place.right - letters.width(high) - apart;
+  float begin = place.left + letters.width(low) + apart;
+  const auto write = [&](float value) {
+    const std::string text = fmt::format("{:g}", value);
+    const float at = place.left + (value - bar.low) / (bar.high - bar.low) * (place.right - place.left),
+                half = .5f * letters.width(text);
+    if (at - half < begin || at + half > end) return;
+    letters.write(image, text, at - half, base);
+    begin = at + half + apart;
+  };
+  if (bar.threshold) return write(*bar.threshold);
+  for (const double value : ticks(double(bar.low), double(bar.high), 4)) write(float(value));
 }
 
 bool paint(frame::Image& image, std::span<const ColourBar> bars, Background background) {
@@ -150,8 +148,8 @@ bool paint(frame::Image& image, std::span<const ColourBar> bars, Background back
       // Units may be long, and leave the title two thirds of the room.
       const float room = right - left - (bar.units.empty() ? 0.f : h);
       const std::string title =
-          shortened(letters, bar.title, std::max(room - letters.width(bar.units), room / 1.5f));
-      const std::string units = shortened(letters, bar.units, room - letters.width(title));
+          letters.shortened(bar.title, std::max(room - letters.width(bar.units), room / 1.5f));
+      const std::string units = letters.shortened(bar.units, room - letters.width(title));
       letters.write(image, title, left, base);
       letters.write(image, units, right - letters.width(units), base);
       base += h * line;
@@ -188,7 +186,7 @@ bool paint(frame::Image& image, std::span<const LegendEntry> all, Background bac
   }
   float widest = 0.f;
   for (LegendEntry& entry : names) {
-    entry.name = shortened(letters, std::move(entry.name), room);
+    entry.name = letters.shortened(std::move(entry.name), room);
     widest = std::max(widest, letters.width(entry.name));
   }
   const float width = indent + widest + 2.f * padding * h,

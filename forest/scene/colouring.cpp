@@ -39,8 +39,8 @@ constexpr std::array<std::uint32_t, 7> layered{0xFDE725, 0x90D743, 0x35B779, 0x2
                                                0x31688E, 0x5A5AA8, 0x8E4A9E};
 
 // The colours neuroanatomists know: soma black or white, axon blue, basal red, apical magenta.
-constexpr std::array<std::uint32_t, 8> anatomical{0x999999, 0xF0E442, 0x0072B2, 0xD55E00,
-                                                  0xCC79A7, 0x009E73, 0x56B4E9, 0x7FD8B8};
+constexpr std::array<std::uint32_t, 8> anatomical{0x999999, 0xF0E442, 0x4A9DE6, 0xD55E00,
+                                                  0xCC79A7, 0x009E73, 0xA6DCFF, 0x7FD8B8};
 
 // How a section kind changes the colour of its neuron: somata brighter, axons cooler and dimmer.
 Vec3 of_kind(const Vec3& base, std::uint32_t kind, float lift) {
@@ -189,12 +189,18 @@ class Painter {
         };
       case ColourBy::kind: {
         Hue hue{{}, {}};
-        for (std::size_t kind = 0; kind < 8; ++kind) hue.kinds[kind] = on_background(anatomical[kind]);
+        for (std::size_t kind = 0; kind < 8; ++kind)  // only the soma's would be lost on light
+          hue.kinds[kind] = kind == 1 ? on_background(anatomical[kind]) : light_of(anatomical[kind]);
         const auto seen = kinds();
+        const auto name = [&](std::size_t kind) -> std::string {
+          if (kind == 1) return "soma";
+          // Files call all dendrites basal where none is apical.
+          if (SectionKind(kind) == SectionKind::basal && !seen[std::size_t(SectionKind::apical)])
+            return "dendrite";
+          return std::string(name_of(SectionKind(kind)));
+        };
         for (std::size_t kind = 0; kind < 8; ++kind)
-          if (seen[kind])
-            hue.legend.push_back(
-                {kind == 1 ? "soma" : std::string(name_of(SectionKind(kind))), hue.kinds[kind]});
+          if (seen[kind]) hue.legend.push_back({name(kind), hue.kinds[kind]});
         const std::uint16_t neurons = add_hue(std::move(hue));
         const auto& types = circuit.types;
         if (std::ranges::none_of(types, &circuit::CellType::glia))

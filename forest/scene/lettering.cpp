@@ -253,6 +253,22 @@ float Lettering::width(std::string_view text) const {
   return std::max(0.f, parts - gap) * height / em;
 }
 
+std::string Lettering::shortened(std::string text, float room) const {
+  if (width(text) <= room) return text;
+  std::vector<std::string_view> signs;
+  for (std::string_view rest = text; !rest.empty();) signs.push_back(next(rest));
+  std::string out;
+  for (std::size_t kept = signs.size(); kept-- > 0;) {
+    const std::size_t front = (kept + 1) / 2;
+    out.clear();
+    for (std::size_t i = 0; i < front; ++i) out += signs[i];
+    out += "…";
+    for (std::size_t i = signs.size() - (kept - front); i < signs.size(); ++i) out += signs[i];
+    if (width(out) <= room) break;
+  }
+  return out;
+}
+
 void Lettering::write(frame::Image& image, std::string_view text, float left, float base) const {
   const float part = height / em, radius = .5f * std::max(thinnest, pen * part);
   while (!text.empty()) {

@@ -3,6 +3,7 @@
 // pixel at any size.
 #pragma once
 
+#include <string>
 #include <string_view>
 
 #include "forest/frame/frame.h"
@@ -16,6 +17,8 @@ struct Lettering {
 
   /// Pixels to the right, of UTF-8. Latin, Greek and their marks; other signs are boxes, and as wide as one.
   float width(std::string_view text) const;
+  /// With "…" for its middle, where it has no room: names often differ in their ends.
+  std::string shortened(std::string text, float room) const;
   /// @param left, base  where the line begins on which capitals stand. What lies beyond the picture is left out.
   void write(frame::Image& image, std::string_view text, float left, float base) const;
 };

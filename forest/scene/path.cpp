@@ -6,6 +6,7 @@
 
 #include "forest/core/error.h"
 #include "forest/geometry/polyline.h"
+#include "forest/scene/gallery.h"
 
 namespace forest::scene {
 namespace {
@@ -70,7 +71,9 @@ View CameraPath::at(float t) const {
   const Mat3 axes = from.slerp(eased(s), to).toRotationMatrix();
   const auto mix = [s](float x, float y) { return x + (y - x) * s; };
   const float reach = mix((a.camera.target - a.camera.eye).norm(), (b.camera.target - b.camera.eye).norm());
-  view.camera.target = view.camera.eye - reach * axes.col(2);
+  view.camera.target = a.camera.target == b.camera.target  // what both look at stays in the middle
+                           ? a.camera.target
+                           : Vec3(view.camera.eye - reach * axes.col(2));
   view.camera.up = axes.col(1);
   view.camera.field_of_view = mix(a.camera.field_of_view, b.camera.field_of_view);
   if (a.plane && b.plane) {
@@ -92,8 +95,9 @@ float soma_clearance(const Forest& forest, const Vec3& point) {
   return nearest;
 }
 
-CameraPath walk(const Forest& forest, std::span<const frame::State> states) {
-  const View start = overview(forest, 16.f / 9.f, states);
+CameraPath walk(const Forest& forest, std::span<const frame::State> states, float aspect) {
+  if (is_gallery(forest)) return CameraPath(around_gallery(forest, aspect, states));
+  const View start = overview(forest, aspect, states);
   // In axes of which y is the forest's way up.
   const Mat3 turn = standing(forest);
   Bounds bounds;

@@ -22,8 +22,10 @@ class CameraPath {
 };
 
 /// The demo's walk: from outside the column to a clear place inside, between the dendrites, never through a soma.
+/// Around traced neurons side by side (gallery.h).
 /// @param states  of its instances: around and into those that are seen
-CameraPath walk(const Forest& forest, std::span<const frame::State> states = {});
+/// @param aspect  width of the pictures over their height
+CameraPath walk(const Forest& forest, std::span<const frame::State> states = {}, float aspect = 16.f / 9.f);
 
 /// From outside the column straight to one soma near its middle, until it fills half the height: what `bench seam` walks.
 /// In equal times the distance to it shrinks by equal shares, slow at both ends, so that it grows evenly.

@@ -11,6 +11,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
+#include "forest/core/round_numbers.h"
 #include "forest/geometry/split_areas.h"
 #include "forest/scene/colouring.h"
 #include "forest/scene/view.h"
@@ -22,6 +23,7 @@ constexpr float smoothing = .055f;  // of the extent of a hemisphere: about the 
 constexpr int most_steps = 240;
 constexpr std::size_t map_colours = 64;
 constexpr float nearly_none = .002f;    // of the largest: so far below 0 are what is none, too
+constexpr float shade_of_values = .5f;  // how much less light sulci get where there are values
 constexpr double share_of_zeros = .01;  // of vertices: from there on they stand for "none"
 const Vec3 plain = light_of(0xD9CDBF);
 
@@ -102,7 +104,10 @@ void Surfaces::colour(std::span<const float> values) {
     throw Error(
         fmt::format("there are {} values and the surface has {} vertices; give the values of this surface",
                     values.size(), one.given.mesh.positions.size()));
-  one.values.assign(values.begin(), values.end()), one.split.reset();
+  one.values.assign(values.begin(), values.end()), one.split.reset(), one.openness.clear();
+  for (const std::uint8_t open : one.given.openness)
+    one.openness.push_back(std::uint8_t(255.f - shade_of_values * float(255 - open)));
+  one.version = next_version();
   learn_values();
 }
 
@@ -210,7 +215,11 @@ void Surfaces::learn_values() {
     std::ranges::nth_element(all, place);
     return *place;
   };
-  const float low = at(.02), high = at(.98);
+  // What a normal distribution has is within; the values between the wall's zeros and those of the cortex are not.
+  constexpr float far = 2.5f;
+  const float middle = at(.5);
+  const float low = std::max(at(.02), middle - far * (middle - at(.16))),
+              high = std::min(at(.98), middle + far * (at(.84) - middle));
   values_ = {least, most, {low, high > low ? high : low + 1.f}};
 }
 
@@ -222,7 +231,11 @@ std::pair<bool, bool> Surfaces::beyond_range() const {
 
 std::pair<float, float> Surfaces::shown_range() const {
   if (range) return *range;
-  return values_ ? values_->usual : std::pair(0.f, 1.f);
+  if (!values_) return {0.f, 1.f};
+  auto [low, high] = values_->usual;
+  if (map->diverging && low < 0.f && high > 0.f) high = std::max(-low, high), low = -high;
+  const auto step = float(round_below(double(high - low) / 16.));
+  return {step * std::floor(low / step), step * std::ceil(high / step)};
 }
 
 void Surfaces::show(frame::Frame& frame, const Colouring& colouring, bool playing) {
@@ -257,9 +270,10 @@ void Surfaces::show(frame::Frame& frame, const Colouring& colouring, bool playin
     }
     frame::Surface& s = shown_.emplace_back();
     s.positions = shape.mesh.positions, s.normals = shape.normals;
-    s.entries = one.entries, s.openness = shape.openness, s.triangles = shape.mesh.triangles;
+    s.entries = one.entries, s.openness = one.values.empty() ? shape.openness : one.openness,
+    s.triangles = shape.mesh.triangles;
     s.opacity = std::uint8_t(std::lround(255.f * std::clamp(one.opacity * visibility, 0.f, 1.f)));
-    s.version = shape.version;
+    s.version = one.version;
   }
   frame.surfaces = shown_;
 }

@@ -66,8 +66,8 @@ class Surfaces {
   float visibility = 1.f;  // times the opacity of each, 0–1; 0: none is shown
 
   const ColourMap* map = &colour_maps().front();
-  /// Values at the ends of the map; none: all but the lowest and highest two hundredths of those that are values
-  /// (zero_means_none).
+  /// Values at the ends of the map; none: round numbers about all but the lowest and highest two hundredths of those that are values
+  /// (zero_means_none) and what lies far from the others; of a diverging map, about zero where some are less and some more.
   std::optional<std::pair<float, float>> range;
   std::pair<float, float> shown_range() const;
   /// Whether there are values below and above that range.
@@ -87,14 +87,15 @@ class Surfaces {
     std::vector<Vec3> normals;
     std::vector<std::uint8_t> openness;
     std::vector<std::uint16_t> areas = {};  // 1 + index of the colour, 0 for none; empty: none
-    std::uint64_t version = next_version();
   };
   struct One {
     Shape given;
-    std::optional<Shape> split = {};         // by areas, so that their colours do not run into one another
-    std::vector<float> values = {};          // of the vertices that were given; empty: plain
-    std::vector<std::uint8_t> entries = {};  // of the vertices that are shown
+    std::optional<Shape> split = {};          // by areas, so that their colours do not run into one another
+    std::vector<float> values = {};           // of the vertices that were given; empty: plain
+    std::vector<std::uint8_t> entries = {};   // of the vertices that are shown
+    std::vector<std::uint8_t> openness = {};  // less unlike, as shade shall not be taken for a value
     float opacity = 1.f;
+    std::uint64_t version = next_version();
 
     const Shape& shown() const { return split ? *split : given; }
   };
@@ -106,7 +107,7 @@ class Surfaces {
   Bounds bounds_;
   struct Values {  // of all that are some
     float least, most;
-    std::pair<float, float> usual;  // all but the lowest and highest two hundredths
+    std::pair<float, float> usual;
   };
   std::optional<Values> values_;
 };

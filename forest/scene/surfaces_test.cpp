@@ -127,8 +127,8 @@ TEST(Surfaces, TheRangeLeavesOutWhatHasNoValue) {
   };
   const auto thickness = [](std::size_t i) { return 1.5f + 2.f * float(i % 101) / 100.f; };
   const auto whole = range_of(thickness);
-  EXPECT_NEAR(whole.first, 1.54f, .03f);
-  EXPECT_NEAR(whole.second, 3.46f, .03f);
+  EXPECT_NEAR(whole.first, 1.5f, 1e-5f);  // about 1.54 and 3.46, in round numbers
+  EXPECT_NEAR(whole.second, 3.5f, 1e-5f);
   // The medial wall, a tenth of it, as FreeSurfer writes it, or as a file without values there does.
   for (const float none : {0.f, float(NAN)}) {
     const auto range = range_of([&](std::size_t i) { return i % 10 ? thickness(i) : none; });
@@ -146,6 +146,16 @@ TEST(Surfaces, TheRangeLeavesOutWhatHasNoValue) {
                                                  : i % 20 ? 0.f
                                                           : -.003f; }).first,
             .5f);
+  // Few values far from all others are beyond the ends: between the wall and the cortex averages have some.
+  const auto edged = range_of([&](std::size_t i) { return i % 25 ? thickness(i) : .02f * float(i % 50); });
+  EXPECT_GT(edged.first, .5f);
+  EXPECT_NEAR(edged.second, whole.second, .2f);
+  // The middle of a diverging map is zero, where values lie on both sides.
+  surfaces.map = find_colour_map("cool-warm");
+  const auto even = range_of([&](std::size_t i) { return thickness(i) - 2.f; });
+  EXPECT_EQ(even.first, -even.second);
+  EXPECT_GT(even.second, 1.4f);
+  EXPECT_GT(range_of(thickness).first, 1.f);
   // What a person says holds.
   surfaces.range = {0.f, 3.f};
   EXPECT_EQ(surfaces.shown_range(), std::pair(0.f, 3.f));

@@ -18,6 +18,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/half.h"
+#include "forest/scene/gallery.h"
 #include "forest/scene/placed.h"
 
 namespace forest::scene {
@@ -406,6 +407,12 @@ Keys<View> keys_of_view() {
           "fog", 0.f, 100.f, [](auto& v) -> auto& { return v.fog; }),
       number<V>(
           "halo", 0.f, 10.f, [](auto& v) -> auto& { return v.halo; }),
+      {"least_width",
+       {"0–4"},
+       [](V& v, const Json& json, const std::string& file) {
+         v.least_width = number_of(json, file, "least_width", 0.f, 4.f);
+       },
+       [](const V& v) { return v.least_width ? Json(*v.least_width) : Json(); }},
       flag<V>(
           "skin", [](auto& v) -> auto& { return v.skin; })
           .said_if([](const V& v) { return !v.skin; }),
@@ -622,8 +629,8 @@ View parse_view(std::string_view text, const std::string& name, const Vec3& up, 
   if (!json.is_object())
     throw InputError(name, 0, "a view is a JSON object with 'eye' and 'target'; see docs/scene/view.md");
   const bool stands = !whole || json.contains("eye") || json.contains("target");
-  View v = stands ? View() : *whole;
-  if (stands) v.camera.up = up;
+  View v = whole ? *whole : View();
+  if (stands) v.camera = frame::Camera{.up = up}, v.fog = View().fog;
   read_all(v, json, keys_of_view(), name, "");  // what is misspelt first
   for (const char* needed : {"eye", "target"})
     if (stands && !json.contains(needed))
@@ -659,6 +666,7 @@ std::vector<ViewKey> plane_keys() { return facts_of(keys_of_plane()); }
 
 View overview(const Forest& forest, float aspect, std::span<const frame::State> states,
               std::span<const frame::Overlay> drawn) {
+  if (is_gallery(forest)) return view_of_gallery(forest, aspect, states);
   const auto seen = seen_in(states);
   View view;
   view.camera.near = 2.f;
@@ -708,6 +716,7 @@ View overview(const Forest& forest, float aspect, std::span<const frame::State> 
 }
 
 std::optional<Vec3> towards_pia(const Forest& forest) {
+  if (is_gallery(forest)) return std::nullopt;
   if (const Vec3& up = forest.circuit().up; up != Vec3::UnitY()) return up.normalized();
   float along = 0.f;
   for (const frame::Instance& i : forest.instances())
@@ -773,11 +782,36 @@ Detail detail_for(const View& view, std::uint32_t width, std::uint32_t height) {
   return detail;
 }
 
+float least_width_of(const Forest& forest, const frame::Camera& camera, std::uint32_t width,
+                     std::uint32_t height) {
+  constexpr std::size_t most = 500;  // of more there is never room for all
+  constexpr float lines_in_height = 700.f, sparse = .3f, dense = 1.f;
+  if (forest.instances().size() > most) return 0.f;
+  double length = 0.;  // of all branches, µm
+  for (const frame::Instance& instance : forest.instances()) {
+    const Neuron& neuron = forest.neurons()[instance.morphology];
+    for (const SectionFacts& section : forest.sections().subspan(neuron.first_section, neuron.section_count))
+      length += double(section.length);
+  }
+  // Pixels a µm in the middle of what is looked at, and how much of the picture the neurons take there at most.
+  const Bounds& somata = forest.soma_bounds();
+  if (somata.empty() || !(length > 0.)) return 0.f;
+  const float scale =
+      camera.focal(float(height)) /
+      (camera.orthographic() ? 1.f : std::max((somata.centre() - camera.eye).norm(), camera.near));
+  const float reach = scale * (.5f * somata.extent().norm() + forest.mean_reach());
+  const float area = std::min(float(width) * float(height), std::numbers::pi_v<float> * reach * reach);
+  const float least = std::max(1.f, float(height) / lines_in_height);
+  const float share = float(length) * scale * least / area;
+  return std::min(least, 4.f) * std::clamp((dense - share) / (dense - sparse), 0.f, 1.f);
+}
+
 frame::Frame compose(const Forest& forest, const View& view, const Colouring& colouring, const Cut& cut,
                      std::uint32_t width, std::uint32_t height, std::span<const frame::Overlay> overlays) {
   frame::Frame f;
   f.camera = view.camera;
   f.width = width, f.height = height, f.subframes = view.samples, f.thinnest = thinnest_of(view);
+  f.least_width = view.least_width.value_or(least_width_of(forest, view.camera, width, height));
   f.palette = colouring.palette;
   f.opacities = colouring.opacities, f.states = colouring.states;
   if (cut.entries)

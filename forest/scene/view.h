@@ -43,6 +43,7 @@ struct View {
   std::uint32_t samples = 16;                    // subframes of a still picture
   float fog = 1.f;                               // strength of the depth cue; 0 for none
   float halo = 1.f;                              // strength of the rim around nearer branches; 0 for none
+  std::optional<float> least_width;              // of branches, pixels, 0–4; none: least_width_of
   bool skin = true;                              // of neurons near the eye (skin.h)
   SynapseColour synapses = SynapseColour::sign;  // where there are some
   std::vector<Appearance> targets;               // how they are shown; later ones win
@@ -56,7 +57,7 @@ struct View {
 ///  "plane":{"at":[0,1000,0],"normal":[0,0,1],"opacity":.18}}; only eye and target are needed, and these not where `whole` is given.
 /// Throws InputError naming the wrong key. Unknown keys are errors too, so that a typing slip is noticed.
 /// @param up     of the camera where nothing is said of it: the forest's (circuit::Circuit::up)
-/// @param whole  what is shown, as far as nothing else is said, where there is neither eye nor target
+/// @param whole  what is shown as far as nothing else is said; without its camera and fog where there is an eye or a target
 View parse_view(std::string_view json, const std::string& name = "view", const Vec3& up = Vec3::UnitY(),
                 const View* whole = nullptr);
 std::string to_json(const View& view);
@@ -109,6 +110,11 @@ struct FlashColours {
   Vec3 bright, fading;
 };
 FlashColours flash_colours(Background background);
+
+/// How wide branches are drawn at least where there is room for all of them, pixels: a seven hundredth of the picture's height, or 1.
+/// Where they would cover the picture it is 0, as what is thin must be faint then, and in between it falls.
+float least_width_of(const Forest& forest, const frame::Camera& camera, std::uint32_t width,
+                     std::uint32_t height);
 
 /// The picture of a view. The spans of the frame point into `cut`, `colouring` and `overlays`, which must outlive it.
 frame::Frame compose(const Forest& forest, const View& view, const Colouring& colouring, const Cut& cut,

@@ -41,6 +41,7 @@ View full_view() {
   view.detail.gaze = Vec2(.25f, .75f);
   view.detail.screen = 40.f;
   view.skin = false;
+  view.least_width = .5f;
   view.synapses = SynapseColour::target;
   view.targets.resize(1);
   view.targets[0].name = "L5", view.targets[0].opacity = .4f;

@@ -31,7 +31,19 @@ first=$(ls grown/*.swc | head -1)
 "$program" render "$first" --size 320x200 -o one.png --json >one.json
 told one.json 'd["neurons"] == 1 and d["covered"] > 0 and d["view"]["colour_by"] == "kind"'
 "$program" render grown.cells --size 320x200 --view '{"background":"light"}' -o three.png --json >three.json
-told three.json 'd["neurons"] == 3 and d["view"]["background"] == "light" and d["view"]["colour_by"] == "type"'
+told three.json 'd["neurons"] == 3 and d["view"]["background"] == "light" and d["view"]["colour_by"] == "kind"'
+# Files and folders of them are hung side by side; what is no neuron is not.
+"$program" render grown --legend --scale --size 400x300 --background light --colour-by neuron -o folder.png --json >folder.json
+told folder.json 'd["neurons"] == 3 and d["view"]["background"] == "light" and d["view"]["colour_by"] == "neuron"'
+"$program" render grown/*.swc "$first" --size 400x300 --view '{"colour_by":"type"}' -o files.png --json >files.json
+told files.json 'd["neurons"] == 4 and d["view"]["colour_by"] == "type" and d["view"]["projection"] == "orthographic"'
+"$program" render "$first" --size 320x200 --view '{"eye":[0,300,2000],"target":[0,300,0]}' -o eye.png --json >eye.json
+told eye.json 'd["view"]["colour_by"] == "kind" and d["view"]["projection"] == "perspective"'
+"$program" movie "$first" --seconds 0.2 --size 160x90 --samples 1 -o around.mp4 >/dev/null
+mkdir nothing
+refuses 'nothing: holds no file of neurons' "$program" render nothing -o no.png
+refuses 'a.forest: is no file of neurons' "$program" render "$first" a.forest -o no.png
+refuses 'nosuch.swc' "$program" render "$first" nosuch.swc -o no.png
 "$program" section "$first" --size 320x200 --height 300 -o cut.png >/dev/null
 head -c 40 "$first" >broken.swc
 refuses 'broken.swc' "$program" render broken.swc -o no.png

@@ -50,7 +50,7 @@ import json
 d, b = json.load(open("above.json")), json.load(open("b.json"))
 assert d["view"]["eye"][2] > 200000 and d["view"]["eye"][0] == d["view"]["target"][0], d["view"]
 assert b["surfaces"]["range"] == [-50, 50] and b["surfaces"]["colour_map"] == "viridis", b["surfaces"]
-assert -60 < d["surfaces"]["range"][0] < -50 and 50 < d["surfaces"]["range"][1] < 60, d["surfaces"]'
+assert -60 <= d["surfaces"]["range"][0] < -50 and 50 < d["surfaces"]["range"][1] <= 60, d["surfaces"]'
 
 # Around a forest, which lies within: what is opaque hides it, and what is not lets it through.
 small_forest 2
@@ -91,4 +91,7 @@ fails_with 2 "surface-opacity" "$program" render lh.pial --surface-opacity 2 -o 
 fails_with 2 "from" "$program" render lh.pial --from inside -o x.png
 printf 'nan\n%.0s' $(seq 7320) >none.txt
 refuses "has no value that is a number" "$program" render lh.pial --overlay none.txt -o x.png
+"$program" render lh.pial --from above --view '{"background":"light"}' -o above.png --size 320x240 --renderer cpu --json >light.json
+told light.json 'd["view"]["background"] == "light"'
+refuses "both say where the eye is" "$program" render lh.pial --from above --view '{"eye":[0,0,9],"target":[0,0,0]}' -o x.png
 refuses "there are none; give --surface" "$program" render a.forest --from left -o x.png

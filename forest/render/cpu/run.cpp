@@ -84,7 +84,7 @@ void load(const frame::Overlay& o, const Picture& picture, Run& r) {
   r.ra[0] = least(o.a), r.rb[0] = least(o.b);
 }
 
-FOREST_CLONES void place(const frame::Constants& c, const Mat3& turn, const Vec3& at, Run& r) {
+FOREST_CLONES void place(const frame::Constants& c, const Mat3& turn, const Vec3& at, float least, Run& r) {
   const float m00 = turn(0, 0), m01 = turn(0, 1), m02 = turn(0, 2), m10 = turn(1, 0), m11 = turn(1, 1),
               m12 = turn(1, 2), m20 = turn(2, 0), m21 = turn(2, 1), m22 = turn(2, 2);
   const float tx = at.x(), ty = at.y(), tz = at.z();
@@ -105,8 +105,8 @@ FOREST_CLONES void place(const frame::Constants& c, const Mat3& turn, const Vec3
     const float from = az < near ? step : 0.f, to = bz < near ? step - 1.f : 0.f;
     ax += from * dx, ay += from * dy, az = larger(az + from * dz, near);
     bx += to * dx, by += to * dy, bz = larger(bz + to * dz, near);
-    const float ra = r.ra[i] + from * dr, rb = r.rb[i] + to * dr;
     const float fa = focal / (converge * az + parallel), fb = focal / (converge * bz + parallel);
+    const float ra = larger(r.ra[i] + from * dr, least / fa), rb = larger(r.rb[i] + to * dr, least / fb);
     r.ax[i] = ax, r.ay[i] = ay, r.az[i] = az, r.ra[i] = ra;
     r.bx[i] = bx, r.by[i] = by, r.bz[i] = bz, r.rb[i] = rb;
     r.px[i] = centre_x + fa * ax, r.py[i] = centre_y - fa * ay;

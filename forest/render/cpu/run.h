@@ -75,7 +75,8 @@ void load(const Picture& picture, const frame::Item& item, const std::uint8_t* e
 void load(const frame::Overlay& overlay, const Picture& picture, Run& r);
 
 /// From the coordinates of their neuron to pixels: camera = turn · p + at.
-void place(const frame::Constants& c, const Mat3& turn, const Vec3& at, Run& r);
+/// @param least  pixels: radii are no smaller
+void place(const frame::Constants& c, const Mat3& turn, const Vec3& at, float least, Run& r);
 
 /// Where they reach as capsules: `reach`, `front` and the box around each.
 /// @param margin  pixels that are added around the box

@@ -160,9 +160,9 @@ class Gatherer {
     const auto [turn, at] = picture_.standing(item);
     load(picture_, item, entries, r_);
     if (kind == Kind::dots) return add_beads(item, turn, at, chunk);
-    place(c, turn, at, r_);
-    if (kind == Kind::capsules) return add_near(chunk);
     const bool straws = picture_.geometry.straw(item);
+    place(c, turn, at, straws ? 0.f : c.least_radius, r_);
+    if (kind == Kind::capsules) return add_near(chunk);
     if (straws) lengthen(c, r_);
     if (lines_hidden(thinnest_of(c, straws))) return 0;
     prepare_lines(c, straws, picture_.spread, r_);
@@ -172,7 +172,7 @@ class Gatherer {
   }
   void add(const frame::Overlay& overlay, Chunk& chunk) {
     load(overlay, picture_, r_);
-    place(picture_.constants, picture_.to_camera, picture_.to_camera * -picture_.eye, r_);
+    place(picture_.constants, picture_.to_camera, picture_.to_camera * -picture_.eye, 0.f, r_);
     add_near(chunk);
   }
   void add(const frame::Ball& ball, std::uint32_t number, Chunk& chunk) const {
@@ -264,13 +264,17 @@ class Gatherer {
   std::uint64_t add_beads(const frame::Item& item, const Mat3& turn, const Vec3& at, Chunk& chunk) {
     const frame::Constants& c = picture_.constants;
     const float depth = picture_.to_camera.row(2).dot(Vec3(item.x, item.y, item.z) - picture_.eye);
-    const Beads beads(r_, c.focal / lens(c, std::max(depth, c.near)));
+    const float pixels_a_unit = c.focal / lens(c, std::max(depth, c.near));
+    if (!picture_.geometry.straw(item))
+      for (float* radius : {&r_.ra[0], &r_.rb[0]})
+        *radius = std::max(*radius, c.least_radius / pixels_a_unit);
+    const Beads beads(r_, pixels_a_unit);
     const float of_item =
         frame::forest_dot_rank(item.instance, (r_.entry[0] & 7) == 1 ? 0u : item.first_segment);
     bool any = false;
     for (std::uint32_t k = 0; k < beads.count; ++k) {
       beads.put(k, r_);
-      place(c, turn, at, r_);
+      place(c, turn, at, 0.f, r_);
       const float rank = fraction(of_item + float(k) * .3819660f + golden * float(c.subframe));
       if (r_.opacity[0] && r_.width[0] >= 0.f) any |= put(Dot(c, r_, rank), chunk.dots, chunk.ranges_of_dots);
     }

@@ -114,7 +114,8 @@ bool extent(const Eye& eye, const Vec3& c, float r, float& left, float& right, f
 }
 
 // False when nothing of it lies in the picture. It is cut at the near distance, as in the other renderers.
-bool project(const Eye& eye, Capsule& c) {
+/// @param least  pixels: its radii are no smaller
+bool project(const Eye& eye, Capsule& c, float least = 0.f) {
   if (c.a.z() < eye.near && c.b.z() < eye.near) return false;
   if (c.a.z() < eye.near || c.b.z() < eye.near) {
     const float t = (eye.near - c.a.z()) / (c.b.z() - c.a.z());
@@ -125,6 +126,7 @@ bool project(const Eye& eye, Capsule& c) {
     else
       c.b = cut, c.rb = r;
   }
+  c.ra = std::max(c.ra, least / eye.scale(c.a.z())), c.rb = std::max(c.rb, least / eye.scale(c.b.z()));
   const auto pixel = [&](const Vec3& v, float out[2]) {
     out[0] = eye.centre_x + eye.scale(v.z()) * v.x(), out[1] = eye.centre_y - eye.scale(v.z()) * v.y();
   };
@@ -549,7 +551,7 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
     c.opacity = (state.opacity * f.opacities[c.entry] + 127u) / 255u;
     c.key = frame::forest_branch_key(instance, s.meta);
     if (drawn.entries) c.entry = drawn.entries[index];
-    return c.opacity > 0 && project(eye, c);
+    return c.opacity > 0 && project(eye, c, straw ? 0.f : .5f * f.least_width);
   };
 
   std::vector<Facet> facets;

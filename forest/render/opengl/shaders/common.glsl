@@ -161,7 +161,12 @@ bool fetch(uint item_index, uint index, out Capsule c) {
     // Which lines are drawn for their like does not change from sample to sample.
     c.rank = fract(float((meta >> 8) & 255u) / 256.0 + golden * float(view.thinnest > 0.0 ? 0u : view.subframe));
   }
-  return clip_near(c);
+  if (!clip_near(c)) return false;
+  if ((view.flags & FOREST_OVERLAY) == 0u && !c.straw) {
+    c.ra = max(c.ra, view.least_radius * lens(c.a.z) / view.focal);
+    c.rb = max(c.rb, view.least_radius * lens(c.b.z) / view.focal);
+  }
+  return true;
 }
 
 // What this thread has to draw, if anything.
