@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
-#include "forest/io/film.h"
 #include "forest/io/png.h"
 #include "forest/scene/colour_bar.h"
 #include "forest/scene/gallery.h"
@@ -20,7 +19,7 @@
 #include "apps/choice.h"
 #include "apps/cli/clock.h"
 #include "apps/cli/console.h"
-#include "apps/cli/files.h"
+#include "apps/cli/reel.h"
 
 namespace forest::cli {
 
@@ -112,7 +111,7 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
 std::string Artist::explain(const scene::View& view, const Marks& marks, frame::Image& image) const {
   std::string missing;
   if (marks.scale && !scene::paint_scale(image, view.camera, view.background)) missing = "scale bar";
-  if (marks.names && scene::is_gallery(forest_)) scene::paint_names(image, forest_, view);
+  if (marks.names && marks.cells && scene::is_gallery(forest_)) scene::paint_names(image, forest_, view);
   std::vector<scene::ColourBar> bars;
   if (marks.legend && playback_)
     bars.push_back(scene::bar_of(*playback_, view.activity.value_or(playback_->view()), view.background));
@@ -139,39 +138,14 @@ std::string Artist::explain(const scene::View& view, const Marks& marks, frame::
              : fmt::format("the picture has no room for a {}; draw it larger, by --size", missing);
 }
 
-namespace {
-
-// Makes room for so many pictures: none of what they replace is anything else, and those of a longer film that was there before go.
-void take_pictures(const std::filesystem::path& folder, std::size_t count) {
-  std::error_code none;
-  std::vector<std::filesystem::path> more;
-  for (std::size_t i = 0;; ++i) {
-    const std::filesystem::path picture = folder / fmt::format("{:05}.png", i);
-    const bool there = std::filesystem::exists(picture, none);
-    if (!there && i >= count) break;
-    if (there) must_take(picture, png_picture);
-    if (i >= count) more.push_back(picture);
-  }
-  for (const std::filesystem::path& picture : more) std::filesystem::remove(picture);
-}
-
-}  // namespace
-
 FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& plan,
                  const std::filesystem::path& file, Progress& progress,
                  const std::optional<scene::ActivityView>& activity) {
-  const auto start = Clock::now();
-  const int count = std::max(1, int(std::lround(plan.seconds * plan.frames_per_second)));
-  if (!plan.pictures.empty()) {
-    std::filesystem::create_directories(plan.pictures);
-    take_pictures(plan.pictures, std::size_t(count));
-  }
-  io::Film film(file, plan.width, plan.height, plan.frames_per_second);
-  FilmFigures figures;
+  Reel reel(plan, file, progress);
+  const int count = reel.count();
   std::uint64_t segments = 0;
   const double picture_ms = plan.rate / plan.frames_per_second;
   artist.set_window(picture_ms);
-  progress.begin("filming", std::size_t(count));
   for (int i = 0; i < count; ++i) {
     scene::View view = path.at(count > 1 ? float(i) / float(count - 1) : 0.f);
     plan.look.put_on(view);
@@ -185,23 +159,16 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
     }
     Drawn drawn = artist.draw(view, plan.width, plan.height, {.outline = plan.outline});
     segments += drawn.segments;
-    figures.covered += drawn.image.covered / count;
     artist.explain(view, plan.marks, drawn.image);
-    film.add(drawn.image.pixels);
-    if (!plan.pictures.empty())
-      io::write_png(plan.pictures / fmt::format("{:05}.png", i), plan.width, plan.height, drawn.image.pixels);
-    progress.advance();
+    reel.add(drawn.image);
   }
-  if (segments && figures.covered == 0.)
+  if (segments && reel.covered() == 0.)
     throw Error(
         fmt::format("the film shows nothing though {} segments were drawn; the OpenGL driver ({}) may be at "
                     "fault, try --renderer cpu",
                     segments, artist.renderer()));
-  film.finish();
-  progress.end();
-  figures.pictures = std::uint32_t(count);
-  figures.seconds = milliseconds_since(start) / 1000.;
-  figures.codec = film.codec();
+  FilmFigures figures = reel.finish();
+  figures.renderer = artist.renderer();
   return figures;
 }
 

@@ -43,6 +43,7 @@ struct Wanted {
 struct Marks {
   bool legend = true;  // what colours of values mean, of the simulation and of surfaces
   bool names = false;  // what colours of neurons mean
+  bool cells = true;   // then also the neurons of a gallery
   bool scale = false;  // how long some µm are
 };
 
@@ -117,7 +118,7 @@ struct FilmFigures {
   std::uint32_t pictures = 0;
   double seconds = 0.;  // drawing and encoding
   double covered = 0.;  // mean share of pixels
-  std::string codec;
+  std::string codec, renderer;
 };
 
 struct FilmPlan {

@@ -16,6 +16,7 @@
 #include "apps/cli/artist.h"
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
+#include "apps/cli/growth_film.h"
 #include "apps/cli/options.h"
 #include "apps/cli/surface_options.h"
 #include "apps/cli/synapse_options.h"
@@ -221,6 +222,7 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     Drawer drawer = Drawer::automatic;
     ActivityOptions activity;
     std::optional<double> rate;
+    bool growth = false;
   };
   const auto options = std::make_shared<Options>();
   command
@@ -269,10 +271,33 @@ std::function<void()> movie(CLI::App& command, Console& console) {
   add_marks(command, options->plan.marks);
   add_renderer(command, options->drawer);
   command.add_option("-o,--out", options->out, "The film, an MP4 file")->required();
+  auto* growth = command.add_flag("--growth", options->growth,
+                                  "How neurons grew: the folders are what 'grow --time-lapse' wrote");
+  for (const char* other : {"--view", "--path", "--activity", "--scanpath", "--surface", "--skin",
+                            "--synapses", "--synapse-file", "--outline", "--node-sets"})
+    growth->excludes(other);
   return [options, &console] {
     must_take(options->out, mp4_film);
     FilmPlan plan = options->plan;
+    const auto tell_of = [&](const FilmFigures& figures) {
+      if (figures.covered == 0.)
+        console.warn(
+            "the film shows nothing: no neuron that is visible lies in its views; give others by --view");
+      console.print({{"file", options->out.string()},
+                     {"pictures", figures.pictures},
+                     {"frames_per_second", figures.pictures / figures.seconds},
+                     {"covered", figures.covered},
+                     {"codec", figures.codec},
+                     {"renderer", figures.renderer}});
+      console.table({"film", "pictures", "pictures/s", "pixels covered", "codec"},
+                    {{options->out.string(), fmt::format("{}", figures.pictures),
+                      fmt::format("{:.1f}", figures.pictures / figures.seconds),
+                      fmt::format("{:.1f} %", 100. * figures.covered), figures.codec}});
+    };
     std::tie(plan.width, plan.height) = parse_size(options->size);
+    add_appearances(options->targets, plan.targets);
+    if (options->growth)
+      return tell_of(film_growth(options->forest, plan, options->drawer, options->out, console.progress()));
     const float aspect = float(plan.width) / float(plan.height);
     const scene::Forest forest = open_forest(options->forest, aspect);
     const scene::View whole = scene::overview(forest, aspect);
@@ -286,7 +311,6 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     if (options->rate && !playing) throw Error("--rate plays an activity file; name it with --activity");
     if (views.size() == 1 && !playing)
       throw Error("a film needs two views or more, or none for a walk into the forest; give another --view");
-    add_appearances(options->targets, plan.targets);
     Artist artist(forest, options->drawer, read_node_sets(forest, options->targets.node_sets, console));
     warn_of_empty(artist.targets(), plan.targets, console);
     artist.show(read_surfaces(options->surfaces, console));
@@ -306,21 +330,7 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     const scene::CameraPath path =
         views.empty() ? scene::walk(forest, states_of(artist.targets(), options->targets), aspect)
                       : scene::CameraPath(std::move(views));
-    const FilmFigures figures =
-        film(artist, path, plan, options->out, console.progress(), look ? look->activity : std::nullopt);
-    if (figures.covered == 0.)
-      console.warn(
-          "the film shows nothing: no neuron that is visible lies in its views; give others by --view");
-    console.print({{"file", options->out.string()},
-                   {"pictures", figures.pictures},
-                   {"frames_per_second", figures.pictures / figures.seconds},
-                   {"covered", figures.covered},
-                   {"codec", figures.codec},
-                   {"renderer", artist.renderer()}});
-    console.table({"film", "pictures", "pictures/s", "pixels covered", "codec"},
-                  {{options->out.string(), fmt::format("{}", figures.pictures),
-                    fmt::format("{:.1f}", figures.pictures / figures.seconds),
-                    fmt::format("{:.1f} %", 100. * figures.covered), figures.codec}});
+    tell_of(film(artist, path, plan, options->out, console.progress(), look ? look->activity : std::nullopt));
   };
 }
 

@@ -14,7 +14,7 @@
 namespace forest::scene {
 namespace {
 
-constexpr const char* hung = "traced";        // the layer that neurons of a gallery lie in
+constexpr const char* traced = "traced";      // the layer that neurons of a gallery lie in
 constexpr float gap = .12f, least_gap = 5.f;  // between neurons: of their mean extent; µm
 constexpr float row_gap = 1.8f;               // times that between rows, where names stand
 constexpr float least_slot = .6f;  // of the mean width: what a neuron takes, that its name has room
@@ -87,7 +87,7 @@ View view_without_place() {
 
 }  // namespace
 
-Forest gallery(std::span<const Morphology> neurons, std::vector<std::string> names, float aspect) {
+std::vector<Vec3> places_in_gallery(std::span<const Morphology> neurons, float aspect) {
   std::vector<Bounds> boxes;
   float extents = 0.f, widths = 0.f;
   for (const Morphology& neuron : neurons) {
@@ -111,30 +111,41 @@ Forest gallery(std::span<const Morphology> neurons, std::vector<std::string> nam
         best = std::move(rows);
     }
   }
-  circuit::Circuit circuit;
-  circuit.name = names.size() == 1 ? names[0] : "neurons";
-  circuit.layers = {{hung, -1.f, 1.f}};
+  std::vector<Vec3> places;
   float y = 0.f;
   for (const Row& row : best) {
     y -= row.above;
     float x = -.5f * row.width;
     for (std::size_t i = row.first; i < row.end; ++i) {
-      circuit::Instance instance;
-      instance.position = {x - boxes[i].low.x(), y, 0.f};
+      places.emplace_back(x - boxes[i].low.x(), y, 0.f);
       x += boxes[i].extent().x() + apart;
-      instance.morphology = instance.type = std::uint32_t(i);
-      circuit.instances.push_back(instance);
-      circuit.types.push_back({names[i], hung});
     }
     y -= row.below + row_gap * apart;
+  }
+  return places;
+}
+
+Forest hung(std::span<const Morphology> neurons, std::vector<std::string> names,
+            std::span<const Vec3> places) {
+  circuit::Circuit circuit;
+  circuit.name = names.size() == 1 ? names[0] : "neurons";
+  circuit.layers = {{traced, -1.f, 1.f}};
+  for (std::size_t i = 0; i < neurons.size(); ++i) {
+    const auto number = std::uint32_t(i);
+    circuit.instances.push_back({.position = places[i], .morphology = number, .type = number});
+    circuit.types.push_back({names[i], traced});
   }
   circuit.morphologies = std::move(names);
   return Forest::from_bytes(pack(circuit, neurons));
 }
 
+Forest gallery(std::span<const Morphology> neurons, std::vector<std::string> names, float aspect) {
+  return hung(neurons, std::move(names), places_in_gallery(neurons, aspect));
+}
+
 bool is_gallery(const Forest& forest) {
   const auto& layers = forest.circuit().layers;
-  return layers.size() == 1 && layers[0].name == hung && layers[0].bottom == -1.f && layers[0].top == 1.f;
+  return layers.size() == 1 && layers[0].name == traced && layers[0].bottom == -1.f && layers[0].top == 1.f;
 }
 
 View view_of_gallery(const Forest& forest, float aspect, std::span<const frame::State> states) {

@@ -15,6 +15,10 @@ namespace forest::scene {
 /// at one height. As many rows as leave them largest in a picture.
 /// @param aspect  width of that picture over its height
 Forest gallery(std::span<const Morphology> neurons, std::vector<std::string> names, float aspect);
+/// The same in two steps: where each soma is then, and neurons hung there, as the same ones are before they are grown.
+std::vector<Vec3> places_in_gallery(std::span<const Morphology> neurons, float aspect);
+Forest hung(std::span<const Morphology> neurons, std::vector<std::string> names,
+            std::span<const Vec3> places);
 /// Whether a forest was made so.
 bool is_gallery(const Forest& forest);
 

@@ -40,6 +40,15 @@ told files.json 'd["neurons"] == 4 and d["view"]["colour_by"] == "type" and d["v
 "$program" render "$first" --size 320x200 --view '{"eye":[0,300,2000],"target":[0,300,0]}' -o eye.png --json >eye.json
 told eye.json 'd["view"]["colour_by"] == "kind" and d["view"]["projection"] == "perspective"'
 "$program" movie "$first" --seconds 0.2 --size 160x90 --samples 1 -o around.mp4 >/dev/null
+# Neurons as they grew: each picture shows no less than the one before, and the last is what they became.
+$BRAINFOREST grow --grammar bes --count 2 --seed 1 --time-lapse 48 --out growing >/dev/null
+"$program" movie growing --growth --seconds 0.4 --size 320x180 --samples 4 --pictures steps -o growth.mp4 --json >growth.json
+told growth.json 'd["pictures"] == 10 and d["covered"] > 0'
+[ "$(ls steps | wc -l)" = 10 ] || fail "not as many pictures as asked for"
+! cmp -s steps/00000.png steps/00009.png || fail "nothing grows"
+refuses 'grown: holds no neuron as it grew' "$program" movie grown --growth -o no.mp4
+fails_with 2 'excludes' "$program" movie growing --growth --skin -o no.mp4
+[ ! -e no.mp4 ] || fail "a film of what was refused"
 mkdir nothing
 refuses 'nothing: holds no file of neurons' "$program" render nothing -o no.png
 refuses 'a.forest: is no file of neurons' "$program" render "$first" a.forest -o no.png
