@@ -93,7 +93,9 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   frame.glass = glass;
   chooser_.complete(frame);
   start = Clock::now();
-  dressing_.put_on(frame, view, cut, eye, colouring, coloured, painter);
+  DressingLimits limits;
+  limits.skin.progress = wanted.progress;
+  dressing_.put_on(frame, view, cut, eye, colouring, coloured, painter, limits);
   drawn.cull += milliseconds_since(start);
   drawn.synapses = dressing_.chosen.balls.size();
   const frame::Timing timing = renderer_->draw(frame);

@@ -35,8 +35,9 @@ struct Drawn {
 
 /// What a picture is wanted for.
 struct Wanted {
-  bool outline = false;  // the column's, too
-  bool pixels = true;    // else they stay where they were drawn, as for a window, if that can be had
+  bool outline = false;                    // the column's, too
+  Progress* progress = &Progress::none();  // of what takes seconds: skin
+  bool pixels = true;  // else they stay where they were drawn, as for a window, if that can be had
 };
 
 /// What stands in a picture so that it can be read.

@@ -20,6 +20,7 @@
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
 #include "apps/cli/verb.h"
+#include "apps/forest_files.h"
 
 namespace forest::cli {
 
@@ -78,6 +79,11 @@ std::function<void()> pack(CLI::App& command, Console& console) {
   command.add_flag("--no-synapses", options->no_synapses,
                    "Leave out the synapses, which are packed beside the forest: column.synapses");
   return [options, &console] {
+    if (holds_cells(options->circuit))
+      throw InputError(
+          options->circuit.string(), 0,
+          "holds neurons and no circuit; 'brainforest render' draws them as they are, and 'plant' makes "
+          "a circuit of a population");
     must_take(options->out, forest_file);
     const std::filesystem::path beside = scene::Synapses::beside(options->out);
     must_take(beside, synapses_file);

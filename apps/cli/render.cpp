@@ -38,6 +38,13 @@ const std::map<std::string, scene::Side> sides{{"left", scene::Side::left},   {"
 
 scene::Forest empty_forest() { return scene::Forest::from_bytes(scene::pack(circuit::Circuit{}, {})); }
 
+// What was asked for and is slower than what is there.
+void warn_of_slow(const Artist& artist, Drawer drawer, Console& console) {
+  if (drawer == Drawer::opengl && artist.renderer().find("llvmpipe") != std::string::npos)
+    console.warn(fmt::format("there is no graphics card, and {} draws slowly; --renderer cpu is faster",
+                             artist.renderer()));
+}
+
 // Who is visible in a view that says nothing of it.
 std::vector<frame::State> states_of(const scene::Targets& targets, const TargetOptions& shown) {
   scene::View plain;
@@ -150,6 +157,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
     scene::Surfaces surfaces = read_surfaces(named, console);
     const scene::Forest forest = alone ? empty_forest() : open_forest(options->forest, aspect);
     Artist artist(forest, options->drawer, read_node_sets(forest, options->targets.node_sets, console));
+    warn_of_slow(artist, options->drawer, console);
     const auto outline = options->outline ? scene::outline(forest) : std::vector<frame::Overlay>();
     if (options->outline && outline.empty())
       console.warn("the forest is neither a column nor planted in elements, so it has no outline");
@@ -177,7 +185,8 @@ std::function<void()> render(CLI::App& command, Console& console) {
     if (options->synapses.colour) view.synapses = *options->synapses.colour;
     play(artist, options->activity, view, console);
     view.samples = artist.still_samples(view);
-    Drawn drawn = artist.draw(view, width, height, {.outline = options->outline});
+    Drawn drawn =
+        artist.draw(view, width, height, {.outline = options->outline, .progress = &console.progress()});
     if (drawn.image.covered == 0.) console.warn(nothing_shown(artist, drawn));
     if (const std::string missing = artist.explain(view, options->marks, drawn.image); !missing.empty())
       console.warn(missing);
@@ -312,6 +321,7 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     if (views.size() == 1 && !playing)
       throw Error("a film needs two views or more, or none for a walk into the forest; give another --view");
     Artist artist(forest, options->drawer, read_node_sets(forest, options->targets.node_sets, console));
+    warn_of_slow(artist, options->drawer, console);
     warn_of_empty(artist.targets(), plan.targets, console);
     artist.show(read_surfaces(options->surfaces, console));
     if (options->skin) artist.give_skin();

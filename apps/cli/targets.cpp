@@ -17,6 +17,7 @@
 #include "apps/cli/options.h"
 #include "apps/cli/target_options.h"
 #include "apps/cli/verb.h"
+#include "apps/forest_files.h"
 
 namespace forest::cli {
 namespace {
@@ -94,7 +95,7 @@ void remove(const std::string& name, scene::Targets& targets) {
 
 void run(const Options& options, Console& console) {
   must_not_be_read("--out", options.out, {options.forest});
-  const scene::Forest forest = scene::Forest::open(options.forest);
+  const scene::Forest forest = open_forest(options.forest);
   scene::Targets targets(forest, read_node_sets(forest, options.node_sets, console));
   for (const std::string& name : options.remove) remove(name, targets);
   for (const std::string& said : options.define) define(said, targets, console);

@@ -134,7 +134,7 @@ class Painter {
   std::uint16_t hue_at(std::size_t first, std::size_t i) const {
     return std::uint16_t(std::min(first + i, hues_.size() - 1));
   }
-  Vec3 on_background(const Vec3& light) const { return light * (light_ ? .7f : 1.f); }
+  Vec3 on_background(const Vec3& light) const { return light * (light_ ? .8f : 1.f); }
   Vec3 on_background(std::uint32_t rgb) const { return on_background(light_of(rgb)); }
 
   const HueOf& scheme(ColourBy by) {

@@ -526,7 +526,9 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
   };
   std::vector<Used> used;
   std::size_t triangles = 0;
+  limits.progress->begin("skin", wanted.size());
   for (auto one = wanted.begin(); one != wanted.end(); ++one) {
+    limits.progress->advance();
     if (!made_.contains(one->key)) {
       std::vector<Key> next;
       for (auto k = one;
@@ -558,6 +560,8 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
     used.push_back({&*one, found->second.get(),
                     1.f - smooth_step(.5f, 1.f, float(double(triangles) / double(limits.triangles)))});
   }
+
+  limits.progress->end();
 
   // Activity colours segments: those that vertices are nearest to, in runs as a list has them.
   Cut runs;

@@ -15,6 +15,7 @@
 #include <tuple>
 #include <vector>
 
+#include "forest/core/progress.h"
 #include "forest/frame/frame.h"
 #include "forest/geometry/polygonise.h"
 #include "forest/scene/chooser.h"
@@ -40,6 +41,7 @@ struct SkinLimits {
       400'000;  // of a picture, pieces aside of which nothing faces the eye: towards it voxels and the widths above grow; what is too much is left out, the farthest first
   std::size_t new_pieces =
       1u << 20;  // made for one picture, the nearest first; others are left out until the next
+  Progress* progress = &Progress::none();
 };
 
 /// A spine of the shaft: neck and head. Real ones are not kept in a forest file, so that these are made up: see Skin::spines.

@@ -770,7 +770,7 @@ View within(View view, const Budget& budget) {
 }
 
 float fog_strength(const View& view) {
-  constexpr float on_light = .3f;
+  constexpr float on_light = .1f;
   return view.background == Background::light ? on_light * view.fog : view.fog;
 }
 
@@ -819,7 +819,8 @@ frame::Frame compose(const Forest& forest, const View& view, const Colouring& co
   static_cast<frame::Lists&>(f) = cut.lists();
   f.overlays = overlays;
   frame::Style& s = f.style;
-  s.halo = view.halo;
+  constexpr float rim_on_light = .3f;  // a darkness among dark branches hides their colours
+  s.halo = view.background == Background::light ? rim_on_light * view.halo : view.halo;
   if (view.background == Background::light) {
     s.background_top = light_of(0xF7F9FC), s.background_bottom = light_of(0xE6EBF2),
     s.fog_colour = light_of(0xEDF1F7);

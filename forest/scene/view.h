@@ -124,8 +124,8 @@ frame::Frame compose(const Forest& forest, const View& view, const Colouring& co
 /// The view as one of those pictures that follow one another shows it: with the detail that the budget has time for.
 View within(View view, const Budget& budget);
 
-/// How strong the fog of its picture is: light is added where the background is light, and little of it bleaches dark branches as
-/// much as much darkness dims bright ones.
+/// How strong the fog of its picture is. Light is added where the background is light, and bleaches the colours of dark branches
+/// before it takes their contrast: so there is less of it.
 float fog_strength(const View& view);
 /// `view.detail` with the gaze in pixels of a picture of that size.
 Detail detail_for(const View& view, std::uint32_t width, std::uint32_t height);

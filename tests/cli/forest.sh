@@ -49,6 +49,8 @@ told growth.json 'd["pictures"] == 10 and d["covered"] > 0'
 refuses 'grown: holds no neuron as it grew' "$program" movie grown --growth -o no.mp4
 fails_with 2 'excludes' "$program" movie growing --growth --skin -o no.mp4
 [ ! -e no.mp4 ] || fail "a film of what was refused"
+"$program" targets "$first" | grep -q all || fail "the targets of a neuron are not told"
+refuses 'holds neurons and no circuit' "$program" pack "$first" -o no.forest
 mkdir nothing
 refuses 'nothing: holds no file of neurons' "$program" render nothing -o no.png
 refuses 'a.forest: is no file of neurons' "$program" render "$first" a.forest -o no.png
