@@ -141,6 +141,8 @@ void run(const Options& options, Console& console) {
     json["slice_correction"].push_back(
         {{"name", u.name}, {"factor", u.factor}, {"measured", u.error.has_value()}});
   if (curved) json["tissue"] = json_of(all);
+  if (circuit.instances.empty())
+    console.warn("nothing is planted: the densities leave less than one neuron; raise them, or --scale");
   console.print(json);
   console.table({"layer", "type", "neurons", "neurons/mm³"}, lines);
   console.say(fmt::format("\n{} neurons of {} shapes are planted in {}", circuit.instances.size(),

@@ -234,6 +234,21 @@ void refuse_too_many(std::size_t elements, double neurons, bool bent, double lee
                     bent ? " of distinct shapes (--bend grid)" : ""));
 }
 
+// The usual volume says how many places there are to choose from.
+void refuse_wrong_volume(std::span<const cortex::Hexahedron> elements, double volume,
+                         const std::filesystem::path& file) {
+  constexpr std::size_t most = 500;  // elements that are looked at
+  constexpr double wrong = 20.;      // times too large or too small
+  const std::size_t stride = (elements.size() + most - 1) / most;
+  double sum = 0., count = 0.;
+  for (std::size_t e = 0; e < elements.size(); e += stride) sum += elements[e].volume(), ++count;
+  if (const double mean = sum / count; !(volume < wrong * mean && volume > mean / wrong))
+    throw InputError(
+        file.string(), 0,
+        fmt::format("says that its elements have {:.3g} mm³, and they have {:.3g}; build them anew",
+                    volume / 1e9, mean / 1e9));
+}
+
 }  // namespace
 
 std::vector<std::uint32_t> parse_elements(const std::string& text, const std::filesystem::path& file,
@@ -307,12 +322,21 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
   const auto measured = measured_borders(options, recipe, file.cortex.elements);
   double mean = circuit::mean_density(recipe), scale = options.scale;
   if (options.density > 0.) {
-    if (measured) {
+    if (measured) {  // the layers of the whole file, so that an element's neurons do not depend on which others are chosen
+      constexpr std::size_t most = 2000;  // elements that are looked at
+      const std::size_t stride = (elements.size() + most - 1) / most;
       std::vector<double> volumes(recipe.layers.size(), 0.);
-      for (const std::uint32_t e : all.elements) {
-        const cortex::Borders borders = measured->of(file.cortex.elements, e);
-        for (std::size_t l = 0; l < volumes.size(); ++l) volumes[l] += borders.volume(elements[e], l);
-      }
+      parallel_in_order((elements.size() + stride - 1) / stride,
+                        [&](std::size_t i) {
+                          const cortex::Borders borders = measured->of(file.cortex.elements, i * stride);
+                          std::vector<double> here;
+                          for (std::size_t l = 0; l < volumes.size(); ++l)
+                            here.push_back(borders.volume(elements[i * stride], l));
+                          return here;
+                        },
+                        [&](std::size_t, const std::vector<double>& here) {
+                          for (std::size_t l = 0; l < volumes.size(); ++l) volumes[l] += here[l];
+                        });
       mean = circuit::mean_density(recipe, volumes);
     }
     if (!(mean > 0.)) throw Error("no layer that is there has neurons; give one a density");
@@ -322,6 +346,7 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
   std::vector<double> volumes(all.elements.size());
   parallel_for(volumes.size(), 64,
                [&](std::size_t i) { volumes[i] = elements[all.elements[i]].volume() * 1e-9; });
+  refuse_wrong_volume(elements, file.volume, options.file);
   refuse_too_many(all.elements.size(), scale * mean * std::accumulate(volumes.begin(), volumes.end(), 0.),
                   bent, 1.5);
   std::vector<bool> wanted_types(recipe.types.size());
@@ -331,6 +356,9 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
         wanted_types[type] = true;
   Stock stock = stock_of(recipe, wanted_types, repo, progress);
   all.planted.unflattened = stock.unflattened;
+  if (const auto bare = std::ranges::count(stock.candidates, 0.f, &circuit::Candidate::soma_radius))
+    all.left_out.push_back(fmt::format("{} to choose from {} no soma of any width, which takes no room",
+                                       counted(std::size_t(bare), "neuron"), bare == 1 ? "has" : "have"));
   const auto start = Clock::now();
   const circuit::ElementPlanter planter(recipe, stock.candidates, seed,
                                         {.scale = scale, .element = file.volume, .bent = bent});
@@ -357,24 +385,41 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
                                          counted(std::size_t(guessed), "element")));
   Shortage shortage(recipe.layers.size());
   all.layer_volumes.resize(recipe.layers.size());
-  for (const std::uint32_t e : all.elements) {
-    const cortex::Borders borders = borders_of(e);
-    shortage.expect(planter.counts(elements[e], e, borders));
-    for (std::size_t l = 0; l < recipe.layers.size(); ++l)
-      all.layer_volumes[l] += borders.volume(elements[e], l);
-  }
+  struct Expected {
+    std::vector<std::vector<std::uint32_t>> counts;
+    std::vector<double> volumes;  // of layers
+  };
+  parallel_in_order(
+      all.elements.size(),
+      [&](std::size_t i) {
+        const std::uint32_t e = all.elements[i];
+        const cortex::Borders borders = borders_of(e);
+        Expected here{planter.counts(elements[e], e, borders), {}};
+        for (std::size_t l = 0; l < recipe.layers.size(); ++l)
+          here.volumes.push_back(borders.volume(elements[e], l));
+        return here;
+      },
+      [&](std::size_t, const Expected& here) {
+        shortage.expect(here.counts);
+        for (std::size_t l = 0; l < recipe.layers.size(); ++l) all.layer_volumes[l] += here.volumes[l];
+      });
   all.volume = std::accumulate(all.layer_volumes.begin(), all.layer_volumes.end(), 0.);
   refuse_too_many(all.elements.size(), shortage.expected(), bent);
 
   std::vector<circuit::Rooted> rooted;
   progress.begin("planting", all.elements.size());
-  for (const std::uint32_t e : all.elements) {
-    all.first.push_back(rooted.size());
-    const auto here = planter.plant(elements[e], e, borders_of(e));
-    shortage.see(here);
-    rooted.insert(rooted.end(), here.begin(), here.end());
-    progress.advance();
-  }
+  parallel_in_order(
+      all.elements.size(),
+      [&](std::size_t i) {
+        const std::uint32_t e = all.elements[i];
+        return planter.plant(elements[e], e, borders_of(e));
+      },
+      [&](std::size_t, const std::vector<circuit::Rooted>& here) {
+        all.first.push_back(rooted.size());
+        shortage.see(here);
+        rooted.insert(rooted.end(), here.begin(), here.end());
+        progress.advance();
+      });
   progress.end();
   all.first.push_back(rooted.size());
   all.seconds = seconds_since(start);

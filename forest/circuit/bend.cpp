@@ -18,7 +18,7 @@ using Place = Eigen::Vector3d;
 struct Tree {
   std::vector<Place> points;
   std::vector<std::int32_t> parents;
-  double height = 0., length = 0.;  // µm above the soma, of all branches
+  double height = 0.;  // µm above the soma
 
   explicit Tree(const Morphology& m) {
     for (const Section& s : m.sections()) {
@@ -30,7 +30,6 @@ struct Tree {
         points.push_back(m.points()[s.first_point + i].position().cast<double>());
         parents.push_back(i > 1 || (i == 1 && above < 0) ? std::int32_t(points.size()) - 2 : above);
         height = std::max(height, points.back().y());
-        if (parents.back() >= 0) length += (points.back() - points[std::size_t(parents.back())]).norm();
       }
     }
   }
@@ -52,12 +51,12 @@ OfOne bend_one(const Tree& tree, const cortex::Seat& seat, const cortex::Sheet& 
     for (Place& p : straight)
       if (p.y() > 0.) p.y() *= share;
   }
-  result.warped = cortex::warp(sheet, seat, straight, tree.parents);
+  result.warped = cortex::warp(sheet, seat, straight, tree.parents, {.traced = tree.points});
   if (result.warped.distortion.beyond_pia > 0.) {
     result.pressed = result.warped.distortion.beyond_pia;
-    result.warped = cortex::warp(sheet, seat, straight, tree.parents, {.below_pia = true});
+    result.warped =
+        cortex::warp(sheet, seat, straight, tree.parents, {.below_pia = true, .traced = tree.points});
   }
-  result.warped.distortion.straight_length = tree.length;
   return result;
 }
 

@@ -258,33 +258,44 @@ std::vector<Rooted> ElementPlanter::plant(const cortex::Hexahedron& element, std
       const double u = p.uvw[0], v = p.uvw[1], w = p.uvw[2];
       return w < borders.begin(u, v, l) || w >= borders.end(u, v, l);
     });
-    // Places by lot; what is too near to the pia or to another layer is not in it.
-    constexpr std::uint64_t blank = ~std::uint64_t(0);
+    // Places by lot, as many as are wanted; those too near to the pia or to another layer are passed over.
     std::vector<Keyed> lots(places.size());
     parallel_for(places.size(), 1024, [&](std::size_t i) {
       Random random(seed_, places[i].item, lot_stream + std::uint32_t(l));
       const std::uint64_t high = random();
-      const bool free = room_for_soma(l, {element, borders, places[i].uvw}) >= 0.;
-      lots[i] = {free ? high << 31 | random() >> 1 : blank, i};
+      lots[i] = {high << 31 | random() >> 1, i};
     });
     parallel_sort(lots);
-    const auto free = std::size_t(std::ranges::find(lots, blank, &Keyed::first) - lots.begin());
-    if (free < count) {  // the same share of all types
+    struct Free {
+      std::size_t place;
+      double room;  // µm
+    };
+    std::vector<Free> free;
+    for (std::size_t drawn = 0; drawn < lots.size() && free.size() < count;) {
+      std::vector<double> rooms(std::min(lots.size() - drawn, (count - free.size()) * 5 / 4 + 8));
+      parallel_for(rooms.size(), 256, [&](std::size_t i) {
+        rooms[i] = room_for_soma(l, {element, borders, places[lots[drawn + i].second].uvw});
+      });
+      for (const double room : rooms) {
+        if (room >= 0. && free.size() < count) free.push_back({lots[drawn].second, room});
+        ++drawn;
+      }
+    }
+    if (free.size() < count) {  // the same share of all types
       std::size_t before = 0;
       for (std::uint32_t& of_type : wanted[l]) {
-        const std::size_t from = before * free / count, to = (before + of_type) * free / count;
+        const std::size_t from = before * free.size() / count, to = (before + of_type) * free.size() / count;
         before += of_type, of_type = std::uint32_t(to - from);
       }
-      count = free;
+      count = free.size();
     }
     const std::size_t begin = rooted.size();
     for (std::uint32_t type = 0; type < wanted[l].size(); ++type)
       rooted.resize(rooted.size() + wanted[l][type], Rooted{.type = type, .layer = std::uint32_t(l)});
     parallel_for(count, 1024, [&](std::size_t i) {
-      const cortex::Packed& place = places[lots[i].second];
+      const cortex::Packed& place = places[free[i].place];
       Rooted& neuron = rooted[begin + i];
-      const Spot spot{element, borders, place.uvw};
-      const cortex::Linear& here = spot.here;
+      const cortex::Linear here = linear(element, place.uvw);
       Random random(seed_, place.item, cell_stream + std::uint32_t(l));
       neuron.uvw = place.uvw;
       neuron.turn = recipe_.rotate ? random.uniform(0., 2. * std::numbers::pi) : 0.;
@@ -292,7 +303,7 @@ std::vector<Rooted> ElementPlanter::plant(const cortex::Hexahedron& element, std
       neuron.depth = float(cortex::below_outer_face(element, place.uvw));
       neuron.orientation = Eigen::Quaterniond(cortex::axes(here.jacobian, neuron.turn)).cast<float>();
       const double height = bent_ ? place.uvw[2] * here.jacobian.col(2).norm() : double(neuron.depth);
-      neuron.candidate = choose(choices_[l][neuron.type], height, room_for_soma(l, spot), random);
+      neuron.candidate = choose(choices_[l][neuron.type], height, free[i].room, random);
     });
   }
   return rooted;

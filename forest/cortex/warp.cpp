@@ -199,6 +199,9 @@ Warped warp(const Sheet& sheet, const Seat& seat, std::span<const Place> points,
                             sheet.junctions.size()));
   if (parents.size() != points.size())
     throw Error(fmt::format("{} points were given {} parents; give one each", points.size(), parents.size()));
+  const std::span<const Place> traced = options.traced.empty() ? points : options.traced;
+  if (traced.size() != points.size())
+    throw Error(fmt::format("{} points are told against {}; give one each", points.size(), traced.size()));
   for (std::size_t n = 0; n < points.size(); ++n) {
     if (!points[n].allFinite())
       throw Error(fmt::format("point {} of a neuron is not a number; correct it", n));
@@ -230,8 +233,8 @@ Warped warp(const Sheet& sheet, const Seat& seat, std::span<const Place> points,
     walk(sheet, charts[n], step, options.below_pia);
     result.points[n] = options.rigid ? Place(soma.at + r * points[n]) : charts[n].here.at;
     if (stem) continue;  // from the soma's middle to its surface there is no branch
-    const Place bent = result.points[n] - result.points[parent];
-    const double before = step.norm(), after = bent.norm();
+    const Place straight = traced[n] - traced[parent], bent = result.points[n] - result.points[parent];
+    const double before = straight.norm(), after = bent.norm();
     d.straight_length += before;
     d.length += after;
     if (before > 0.) {
@@ -243,10 +246,10 @@ Warped warp(const Sheet& sheet, const Seat& seat, std::span<const Place> points,
       (left == Left::by_pia ? d.beyond_pia : left == Left::by_white ? d.beyond_white : d.beside) += after;
     if (parents[parent] < 0) continue;
     const auto grandparent = std::size_t(parents[parent]);
-    const Place step_before = points[parent] - points[grandparent],
+    const Place straight_before = traced[parent] - traced[grandparent],
                 bent_before = result.points[parent] - result.points[grandparent];
-    if (!(before > 0.) || step_before.isZero(0.)) continue;
-    const double change = std::abs(angle(bent_before, bent) - angle(step_before, step));
+    if (!(before > 0.) || straight_before.isZero(0.)) continue;
+    const double change = std::abs(angle(bent_before, bent) - angle(straight_before, straight));
     turns += change;
     ++turned;
     d.largest_turn = std::max(d.largest_turn, change);

@@ -65,6 +65,8 @@ Eigen::Matrix3d axes(const Eigen::Matrix3d& jacobian, double turn);  // of the e
 struct WarpOptions {
   bool rigid = false;
   bool below_pia = false;  // bent: what would pass the pia lies on it
+  /// The neuron that distortion is told against, where it was made shorter before; as many points. None: `points`.
+  std::span<const Eigen::Vector3d> traced = {};
 };
 
 /// What became of a neuron. Segments lead from a point to its parent; angles are those between a segment and the one before it.
