@@ -17,6 +17,7 @@
 #include "apps/cli/files.h"
 #include "apps/cli/options.h"
 #include "apps/cli/plots.h"
+#include "apps/cli/readable.h"
 #include "apps/cli/report.h"
 #include "apps/cli/samples.h"
 #include "apps/cli/verb.h"
@@ -58,9 +59,9 @@ std::size_t count_of(const Division& d, std::size_t type) {
 std::string by_what(const std::vector<Trait>& traits, std::size_t most) {
   std::string out;
   for (std::size_t i = 0; i < std::min(most, traits.size()); ++i)
-    out += fmt::format("{}{} {} ({:.4g} against {:.4g}{}{})", i ? ", " : "",
+    out += fmt::format("{}{} {} ({} against {}{}{})", i ? ", " : "",
                        traits[i].delta.value > 0. ? "larger" : "smaller", traits[i].feature.name,
-                       traits[i].mean_inside, traits[i].mean_outside,
+                       readable(traits[i].mean_inside), readable(traits[i].mean_outside),
                        traits[i].feature.unit.empty() ? "" : " ", traits[i].feature.unit);
   return out.empty() ? "no single metric" : out;
 }

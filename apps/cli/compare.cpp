@@ -19,6 +19,7 @@
 #include "apps/cli/files.h"
 #include "apps/cli/options.h"
 #include "apps/cli/plots.h"
+#include "apps/cli/readable.h"
 #include "apps/cli/report.h"
 #include "apps/cli/samples.h"
 #include "apps/cli/verb.h"
@@ -79,15 +80,14 @@ Json json_of(const Comparison& c, const std::array<std::string, 2>& names, const
           {"metrics", metrics}};
 }
 
-std::string shown(double x) { return std::isnan(x) ? "-" : fmt::format("{:.4g}", x); }
 std::string shown_p(double p) { return p < 1e-4 ? fmt::format("{:.0e}", p) : fmt::format("{:.4f}", p); }
 
 std::string named(const Feature& f) { return f.unit.empty() ? f.name : f.name + " (" + f.unit + ")"; }
 
 std::vector<std::string> row_of(const Difference& d) {
   return {named(d.feature),
-          fmt::format("{} ± {}", shown(d.mean_a), shown(d.sd_a)),
-          fmt::format("{} ± {}", shown(d.mean_b), shown(d.sd_b)),
+          fmt::format("{} ± {}", readable(d.mean_a), readable(d.sd_a)),
+          fmt::format("{} ± {}", readable(d.mean_b), readable(d.sd_b)),
           d.compared() ? fmt::format("{:.2f}", d.delta.value) : "-",
           d.compared() ? shown_p(d.p_holm) : "-",
           d.compared() ? fmt::format("{:.2f}", d.mvs) : "-"};
@@ -112,9 +112,9 @@ std::vector<std::vector<std::string>> rows_of_tests(const Comparison& c) {
   return {{"random forest, all features", with_interval(c.forest.auc), shown_p(c.forest.p)},
           {"random forest, structure", with_interval(c.structure.auc), "-"},
           {"logistic regression, all features", with_interval(c.logistic.auc), shown_p(c.logistic.p)},
-          {"energy distance", shown(c.energy.distance), shown_p(c.energy.p)},
-          {"maximum mean discrepancy", shown(c.mmd.distance), shown_p(c.mmd.p)},
-          {"persistence images", shown(c.barcodes.distance), shown_p(c.barcodes.p)},
+          {"energy distance", readable(c.energy.distance), shown_p(c.energy.p)},
+          {"maximum mean discrepancy", readable(c.mmd.distance), shown_p(c.mmd.p)},
+          {"persistence images", readable(c.barcodes.distance), shown_p(c.barcodes.p)},
           {"Sholl inside the band", fmt::format("{:.0f} % of radii", 100. * c.sholl_inside), "-"}};
 }
 

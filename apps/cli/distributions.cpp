@@ -19,6 +19,7 @@
 #include "apps/cli/options.h"
 #include "apps/cli/parametric_model.h"
 #include "apps/cli/plots.h"
+#include "apps/cli/readable.h"
 #include "apps/cli/report.h"
 #include "apps/cli/samples.h"
 #include "apps/cli/verb.h"
@@ -40,11 +41,10 @@ struct Options {
   std::string form = "burke";
 };
 
-std::string shown(double value) { return std::isnan(value) ? "-" : fmt::format("{:.4g}", value); }
-
 std::string shown(const ParameterEstimate& e) {
-  return std::isnan(e.lower) ? shown(e.value)
-                             : fmt::format("{} [{}, {}]", shown(e.value), shown(e.lower), shown(e.upper));
+  return std::isnan(e.lower)
+             ? readable(e.value)
+             : fmt::format("{} [{}, {}]", readable(e.value), readable(e.lower), readable(e.upper));
 }
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
@@ -82,7 +82,7 @@ std::string estimates_of(const DistributionFit& f) {
   std::string text;
   for (const ParameterEstimate& e : f.estimates)
     text += fmt::format("{}{} {}", text.empty() ? "" : ", ", e.name, shown(e));
-  if (f.distribution.step > 0.) text += fmt::format(", in steps of {}", shown(f.distribution.step));
+  if (f.distribution.step > 0.) text += fmt::format(", in steps of {}", readable(f.distribution.step));
   return text;
 }
 
@@ -93,7 +93,7 @@ void print(const SegmentFamilies& f, Given by, Console& console) {
     if (by == Given::nothing ? table.given != Given::order : table.given != by) continue;
     std::vector<std::vector<std::string>> lines;
     for (const ChanceBin& b : table.bins)
-      lines.push_back({shown(b.upper), std::to_string(b.count), shown(b.chance)});
+      lines.push_back({readable(b.upper), std::to_string(b.count), shown(b.chance)});
     const std::string unit(unit_of(table.given));
     console.table({fmt::format("{} up to{}", name_of(table.given), unit.empty() ? "" : " (" + unit + ")"),
                    "segments", "chance to fork"},
@@ -105,11 +105,11 @@ void print(const SegmentFamilies& f, Given by, Console& console) {
       if (q.family != family || q.fit.count == 0) continue;
       const auto line = [&](std::string name, const DistributionFit& d) {
         lines.push_back({std::move(name), std::string(q.unit), std::to_string(d.count), d.name,
-                         shown(d.kolmogorov), shown(d.p), estimates_of(d)});
+                         readable(d.kolmogorov), readable(d.p), estimates_of(d)});
       };
       line(std::string(q.name), q.fit);
       for (const auto& bin : q.bins)
-        line(fmt::format("  {} up to {}", name_of(by), shown(bin.upper)), bin.fit);
+        line(fmt::format("  {} up to {}", name_of(by), readable(bin.upper)), bin.fit);
     }
     if (lines.empty()) continue;
     console.say(fmt::format("\n{}", name_of(family)));
@@ -154,8 +154,8 @@ std::string percent(const ParameterEstimate& e) {
 }
 
 std::string note_of(const DistributionFit& f) {
-  return fmt::format("{}, {}; distance {}{}", f.name, counted(f.count, "value"), shown(f.kolmogorov),
-                     std::isnan(f.p) ? "" : fmt::format(", p {}", shown(f.p)));
+  return fmt::format("{}, {}; distance {}{}", f.name, counted(f.count, "value"), readable(f.kolmogorov),
+                     std::isnan(f.p) ? "" : fmt::format(", p {}", readable(f.p)));
 }
 
 std::string report_of(const SegmentFamilies& f, const SegmentValues& seen, const Sample& sample,
@@ -170,7 +170,7 @@ std::string report_of(const SegmentFamilies& f, const SegmentValues& seen, const
     std::vector<IntervalRow> rows;
     const std::string unit(unit_of(table.given));
     for (const ChanceBin& b : table.bins)
-      rows.push_back({.label = fmt::format("{} up to {}{}{}", name_of(table.given), shown(b.upper),
+      rows.push_back({.label = fmt::format("{} up to {}{}{}", name_of(table.given), readable(b.upper),
                                            unit.empty() ? "" : " ", unit),
                       .value = b.chance.value,
                       .lower = b.chance.lower,
@@ -198,11 +198,11 @@ std::string report_of(const SegmentFamilies& f, const SegmentValues& seen, const
       bool first = true;
       for (const ParameterEstimate& e : q.fit.estimates)
         parameters.push_back({first ? std::string(q.name) : "", std::exchange(first, false) ? q.fit.name : "",
-                              e.name, shown(e.value), shown(e.lower), shown(e.upper)});
+                              e.name, readable(e.value), readable(e.lower), readable(e.upper)});
       for (const auto& c : q.fit.candidates)
         candidates.push_back({&c == &q.fit.candidates.front() ? std::string(q.name) : "", c.name,
-                              std::to_string(c.parameters), shown(c.log_likelihood), shown(c.aicc),
-                              shown(c.bic), &c == &q.fit.candidates.front() ? "✓" : ""});
+                              std::to_string(c.parameters), readable(c.log_likelihood), readable(c.aicc),
+                              readable(c.bic), &c == &q.fit.candidates.front() ? "✓" : ""});
     }
     if (panels.empty()) continue;
     std::string title(name_of(family));

@@ -16,6 +16,7 @@
 #include "apps/cli/files.h"
 #include "apps/cli/judging.h"
 #include "apps/cli/plots.h"
+#include "apps/cli/readable.h"
 #include "apps/cli/report.h"
 
 namespace forest::cli {
@@ -77,9 +78,10 @@ std::vector<std::vector<std::string>> rows_of_cells(const LeaveOneOut& r) {
     const auto& odd = c.typicality.oddities;
     rows.push_back({c.cell, fmt::format("{:.3f}{}", c.typicality.p, c.typicality.p <= .05 ? " strange" : ""),
                     fmt::format("{:.2f}", c.structure), fmt::format("{:.2f}", c.whole),
-                    odd.empty() ? ""
-                                : fmt::format("{} {:.4g} ({:.4g}–{:.4g})", odd.front().feature.name,
-                                              odd.front().value, odd.front().low, odd.front().high)});
+                    odd.empty()
+                        ? ""
+                        : fmt::format("{} {} ({})", odd.front().feature.name, readable(odd.front().value),
+                                      readable_range(odd.front().low, odd.front().high))});
   }
   return rows;
 }

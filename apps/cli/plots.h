@@ -27,7 +27,7 @@ struct IntervalRow {
 };
 
 struct IntervalAxis {
-  double low, high;
+  double low, high;                          // at least: it is as long as the rows need
   std::vector<double> marks;                 // lines across all rows
   std::string title, left = {}, right = {};  // what the ends mean
 };
@@ -42,7 +42,13 @@ struct StripPanel {
   std::optional<double> marked = {};  // a single cell
 };
 
-std::string strip_plots(std::span<const StripPanel> panels, std::span<const std::string> names);
+struct StripKeys {
+  std::vector<std::size_t> colours = {};  // of the populations; none: in their order
+  std::string marked = {};                // what the marked cell is called
+};
+
+std::string strip_plots(std::span<const StripPanel> panels, std::span<const std::string> names,
+                        const StripKeys& more = {});
 
 /// Mean curves over x = step, 2 step, …, each with a band or without.
 struct CurveLine {

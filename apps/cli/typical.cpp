@@ -19,6 +19,7 @@
 #include "apps/cli/neurons.h"
 #include "apps/cli/options.h"
 #include "apps/cli/plots.h"
+#include "apps/cli/readable.h"
 #include "apps/cli/report.h"
 #include "apps/cli/samples.h"
 #include "apps/cli/verb.h"
@@ -65,8 +66,23 @@ std::string words_of(const Oddity& o) {
     return fmt::format("{}, which has {} value here and {} of the population",
                        name.substr(0, name.size() - whether.size()), o.value > 0. ? "a" : "no",
                        o.median > .5 ? "one in most" : "none in most");
-  return fmt::format("{} {:.4g}{}{} ({:.4g}–{:.4g} in the population)", o.feature.name, o.value,
-                     o.feature.unit.empty() ? "" : " ", o.feature.unit, o.low, o.high);
+  return fmt::format("{} {}{}{} ({} in the population)", o.feature.name, readable(o.value),
+                     o.feature.unit.empty() ? "" : " ", o.feature.unit, readable_range(o.low, o.high));
+}
+
+/// In how many metrics it is beyond all cells, and in how many a cell of the population is.
+std::string outside_of(const Typicality& t) {
+  const std::string out = fmt::format("Of {} it lies outside the range of all {} cells in {}",
+                                      counted(t.metrics, "metric"), t.cells, t.outside);
+  return out +
+         (t.outside > t.outside_most
+              ? fmt::format(
+                    ", more than any of these cells does when it is left out (the median is {:g}, the "
+                    "most {}).",
+                    t.outside_usual, t.outside_most)
+              : fmt::format("; these cells, each left out in turn, do so in {:g} (median), and {} of them in "
+                            "as many or more.",
+                            t.outside_usual, t.as_much_outside));
 }
 
 std::string sentence(const std::string& cell, const Typicality& t, const std::string& population) {
@@ -78,18 +94,38 @@ std::string sentence(const std::string& cell, const Typicality& t, const std::st
                 "{} is as strange beside {} as so few cells can show: p = {:.3g} is the least that {} cells "
                 "give, where 59 could tell: ",
                 cell, population, t.p, t.cells)
-          : fmt::format("{} is {} of {} (p = {:.3g}, {} cells): ", cell,
-                        t.p <= .05  ? "not typical"
-                        : t.p <= .2 ? "at the edge of what is typical"
-                                    : "typical",
-                        population, t.p, t.cells);
+      : few ? fmt::format(
+                  "{}: the {} cells of {} are too few to say whether it is typical (p = {:.3g}; 59 could "
+                  "tell): ",
+                  cell, t.cells, population, t.p)
+            : fmt::format("{} is {} of {} (p = {:.3g}, {} cells): ", cell,
+                          t.p <= .05                                ? "not typical"
+                          : t.p <= .2 || t.outside > t.outside_most ? "at the edge of what is typical"
+                                                                    : "typical",
+                          population, t.p, t.cells);
+  if (t.oddities.empty()) return out + "nothing can be said of it.";
   if (abnormal == 0)
-    return out + (t.oddities.empty()
-                      ? "nothing can be said of it."
-                      : "no metric is abnormal; the most unusual is " + words_of(t.oddities.front()) + ".");
-  out +=
-      fmt::format("{} abnormal, ", abnormal == 1 ? "one metric is" : fmt::format("{} metrics are", abnormal));
-  return out + "led by " + words_of(t.oddities.front()) + ".";
+    out += fmt::format("no {}; the most unusual is ",
+                       few ? "single metric can be called abnormal" : "metric is abnormal");
+  else
+    out += fmt::format("{} abnormal, led by ",
+                       abnormal == 1 ? "one metric is" : fmt::format("{} metrics are", abnormal));
+  out += words_of(t.oddities.front()) + ".";
+  return t.metrics == 0 ? out : out + " " + outside_of(t);
+}
+
+const std::vector<std::string> header{"metric", "unit", "value", "median", "5–95 %", "p", ""};
+
+std::vector<std::string> row_of(const Oddity& o) {
+  return {o.feature.name,
+          o.feature.unit,
+          readable(o.value),
+          readable(o.median),
+          readable_range(o.low, o.high),
+          fmt::format("{:.3f}", o.p),
+          o.abnormal  ? "abnormal"
+          : o.outside ? "outside"
+                      : ""};
 }
 
 Json json_of(const std::string& cell, const Typicality& t, const std::string& population) {
@@ -103,7 +139,8 @@ Json json_of(const std::string& cell, const Typicality& t, const std::string& po
                        {"high", o.high},
                        {"strangeness", o.strangeness},
                        {"p", o.p},
-                       {"abnormal", o.abnormal}});
+                       {"abnormal", o.abnormal},
+                       {"outside", o.outside}});
   return {{"cell", cell},
           {"population", population},
           {"cells", t.cells},
@@ -112,6 +149,11 @@ Json json_of(const std::string& cell, const Typicality& t, const std::string& po
           {"p_whole", t.p_whole},
           {"p_metric", t.p_feature},
           {"p_missing", t.p_missing},
+          {"outside", t.outside},
+          {"outside_of", t.metrics},
+          {"outside_usual", t.outside_usual},
+          {"outside_most", t.outside_most},
+          {"outside_as_many", t.as_much_outside},
           {"sentence", sentence(cell, t, population)},
           {"metrics", metrics}};
 }
@@ -151,11 +193,8 @@ void run(const Options& options, Console& console) {
     if (answers.size() > 1) continue;
     console.say("");
     std::vector<std::vector<std::string>> lines;
-    for (const Oddity* o : telling(t, stacked(std::array{known, asked}), 12))
-      lines.push_back({o->feature.name, o->feature.unit, fmt::format("{:.4g}", o->value),
-                       fmt::format("{:.4g}", o->median), fmt::format("{:.4g}–{:.4g}", o->low, o->high),
-                       fmt::format("{:.3f}", o->p), o->abnormal ? "abnormal" : ""});
-    console.table({"metric", "unit", "value", "median", "5–95 %", "p", ""}, lines);
+    for (const Oddity* o : telling(t, stacked(std::array{known, asked}), 12)) lines.push_back(row_of(*o));
+    console.table(header, lines);
   }
   console.print(out.size() == 1 ? out[0] : out);
 
@@ -172,6 +211,9 @@ void run(const Options& options, Console& console) {
                     {"p of the strangest metric", fmt::format("{:.3f}", t.p_feature)},
                     {"metrics that are abnormal",
                      fmt::format("{}", std::ranges::count_if(t.oddities, &Oddity::abnormal))},
+                    {"metrics outside all cells", fmt::format("{} of {}", t.outside, t.metrics)},
+                    {"usual for cells of the population",
+                     fmt::format("{:g}, at most {}", t.outside_usual, t.outside_most)},
                     {"cells it stands beside", fmt::format("{}", t.cells)}});
     std::vector<StripPanel> panels;
     std::vector<std::vector<std::string>> lines;
@@ -181,16 +223,14 @@ void run(const Options& options, Console& console) {
         panels.push_back(panel_of(o->feature, std::array{&known}));
         panels.back().marked = o->value;
       }
-      lines.push_back({o->feature.name, o->feature.unit, fmt::format("{:.4g}", o->value),
-                       fmt::format("{:.4g}", o->median), fmt::format("{:.4g}–{:.4g}", o->low, o->high),
-                       fmt::format("{:.3f}", o->p), o->abnormal ? "abnormal" : ""});
+      lines.push_back(row_of(*o));
     }
-    report.plot(strip_plots(panels, std::array<std::string, 1>{population.name}),
-                "The strangest metrics first, none nearly the same as another. Every dot is a cell of the "
-                "population, the "
-                "arrow is " +
-                    cells.cells[i] + ".");
-    report.table({"metric", "unit", "value", "median", "5–95 %", "p", ""}, lines);
+    report.plot(
+        strip_plots(panels, std::array<std::string, 1>{population.name}, {.marked = cells.cells[i]}),
+        fmt::format("The strangest of {}, none nearly the same as another: among so many every cell stands "
+                    "aside in some. Every dot is a cell of the population, the arrow is {}.",
+                    counted(t.metrics, "metric"), cells.cells[i]));
+    report.table(header, lines);
   }
   write_unless_there(options.report, report.html(), options.force);
   console.say(fmt::format("The report is {}", options.report.string()));

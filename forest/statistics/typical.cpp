@@ -21,6 +21,15 @@ double conformal_p(std::span<const double> scores) {
   return double(as_high) / double(scores.size());
 }
 
+/// Which of the values lie outside the range of all others: the first and the last, unless another has the same.
+std::vector<std::size_t> outermost(std::span<const double> values) {
+  const auto [low, high] = std::ranges::minmax_element(values);
+  std::vector<std::size_t> out;
+  for (const auto at : {low, high})
+    if (std::ranges::count(values, *at) == 1) out.push_back(std::size_t(at - values.begin()));
+  return out;
+}
+
 bool same_cell(const FeatureTable& a, Eigen::Index row, const FeatureTable& b) {
   for (Eigen::Index c = 0; c < a.values.cols(); ++c) {
     const double x = a.values(row, c), y = b.values(0, c);
@@ -59,7 +68,7 @@ Typicality typicality(const FeatureTable& population, const FeatureTable& cell) 
 
   // Metric by metric, beside the cells that have it: a value that was filled in says nothing of how far values go.
   const FeatureTable raw = stacked(both);
-  std::vector<double> strangest(std::size_t(n), 0.);
+  std::vector<double> strangest(std::size_t(n), 0.), outside(std::size_t(last), 0.);
   for (Eigen::Index c = 0; c < table.values.cols(); ++c) {
     const auto same = std::ranges::find(raw.features, table.features[std::size_t(c)]) - raw.features.begin();
     const auto& column = same < raw.values.cols() ? raw.values.col(same) : table.values.col(c);
@@ -85,15 +94,25 @@ Typicality typicality(const FeatureTable& population, const FeatureTable& cell) 
     }
     if (!asked) continue;
     const auto known = std::span(values).first(values.size() - 1);
+    const auto [lowest, highest] = std::ranges::minmax(known);
     out.oddities.push_back({.feature = table.features[std::size_t(c)],
                             .value = values.back(),
                             .median = quantile(known, .5),
                             .low = quantile(known, .05),
                             .high = quantile(known, .95),
                             .strangeness = strangeness(away.back()),
-                            .p = conformal_p(away)});
+                            .p = conformal_p(away),
+                            .outside = values.back() < lowest || values.back() > highest});
+    if (same == raw.values.cols()) continue;  // "… is defined" is no metric
+    ++out.metrics;
+    out.outside += out.oddities.back().outside;
+    for (const std::size_t k : outermost(known)) ++outside[std::size_t(having[k])];
   }
   out.p_feature = conformal_p(strangest);
+  out.outside_usual = quantile(outside, .5);
+  out.outside_most = std::size_t(std::ranges::max(outside));
+  out.as_much_outside = std::size_t(
+      std::ranges::count_if(outside, [&](double metrics) { return metrics >= double(out.outside); }));
   std::vector<double> missing;
   for (Eigen::Index i = 0; i < n; ++i) missing.push_back(double(raw.values.row(i).array().isNaN().count()));
   out.p_missing = conformal_p(missing);

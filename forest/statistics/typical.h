@@ -22,6 +22,7 @@ struct Oddity {
            // 95 % are at the median, 0.05 over p.
   double p = 1.;          // of this feature alone, two-sided
   bool abnormal = false;  // stranger than the strangest feature of 95 % of the cells
+  bool outside = false;   // less, or more, than in every cell of the population
 };
 
 struct Typicality {
@@ -32,6 +33,13 @@ struct Typicality {
       1.;  // how many features are not defined: a cell without dendrites is strange in no dendrite's length
   std::size_t cells = 0;         // of the population, without the cell itself
   std::vector<Oddity> oddities;  // the strangest first
+
+  // Of few cells each is the first or the last in many metrics, so that how many says something only beside what is usual.
+  std::size_t metrics = 0;       // that the cell and five others have
+  std::size_t outside = 0;       // of these: where the cell is outside
+  double outside_usual = 0.;     // of these: where a cell of the population is, left out in turn: the median
+  std::size_t outside_most = 0;  // and the most
+  std::size_t as_much_outside = 0;  // cells of the population that are in as many as the cell, or more
 
   /// What p is where nothing of the population is as strange: with so few cells it cannot be less.
   double least_p() const { return std::min(1., 3. / double(cells + 1)); }

@@ -85,6 +85,59 @@ TEST(Typicality, SeesACellOfWhichLittleIsKnown) {
   EXPECT_GT(t.oddities.front().strangeness, 2.);  // "… is defined", which it is in all the others
 }
 
+// Four metrics of six cells, by hand. Ranges of the six: 1–6, 1–2, 0–9, and 5–9 of the five that have the last.
+TEST(Typicality, CountsMetricsOutsideTheRangeOfAllOthers) {
+  FeatureTable population;
+  for (const char* name : {"a", "b", "c", "d"}) population.features.push_back({name, "", false});
+  population.values.resize(6, 4);
+  population.values << 1., 1., 0., 5.,  // first in a and d; in b another is as small, in c too
+      2., 1., 0., 6.,                   //
+      3., 2., 1., 7.,                   //
+      4., 2., 2., 8.,                   //
+      5., 1.5, 3., 9.,                  // last in d
+      6., 1.7, 9., NAN;                 // last in a and c
+  FeatureTable cell = population;
+  population.cells = {"0", "1", "2", "3", "4", "5"};
+  cell.cells = {"asked"};
+  cell.values.resize(1, 4);
+  cell.values << 7., 2., -1., 8.5;  // outside in a and c; at the end of b's range is not outside
+  const Typicality t = typicality(population, cell);
+  EXPECT_EQ(t.metrics, 4u);
+  EXPECT_EQ(t.outside, 2u);
+  EXPECT_EQ(t.outside_usual, .5);  // of 2, 0, 0, 0, 1, 2
+  EXPECT_EQ(t.outside_most, 2u);
+  EXPECT_EQ(t.as_much_outside, 2u);
+  for (const Oddity& o : t.oddities) {
+    const std::string& name = o.feature.name;
+    EXPECT_EQ(o.outside, name == "a" || name == "c") << name;
+  }
+
+  cell.values(0, 3) = NAN;  // what it has not got counts for no cell
+  const Typicality without = typicality(population, cell);
+  EXPECT_EQ(without.metrics, 3u);
+  EXPECT_EQ(without.outside_usual, 0.);  // of 1, 0, 0, 0, 0, 2
+}
+
+// A cell of the population is outside in as many metrics as any other of them: in 2 of n + 1 on average.
+TEST(Typicality, FindsCellsOfThePopulationOutsideAsOftenAsOneAnother) {
+  double asked = 0., usual = 0.;
+  int beyond = 0;
+  for (std::uint64_t trial = 0; trial < 300; ++trial) {
+    const Typicality t = typicality(cells(trial, 19), cells(10000 + trial, 1));
+    asked += double(t.outside) / 300., usual += t.outside_usual / 300.;
+    beyond += t.outside > t.outside_most;
+  }
+  EXPECT_NEAR(asked, 30. * 2. / 20., .4);
+  EXPECT_NEAR(usual, 30. * 2. / 19., .6);
+  EXPECT_LT(beyond, 25);  // at most 15 expected
+  FeatureTable odd = cells(77, 1);
+  odd.values.array() += 50.;
+  const Typicality t = typicality(cells(1, 19), odd);
+  EXPECT_EQ(t.outside, 30u);
+  EXPECT_GT(t.outside, t.outside_most);
+  EXPECT_EQ(t.as_much_outside, 0u);
+}
+
 TEST(Typicality, LeavesTheCellItselfOutOfItsPopulation) {
   const FeatureTable all = cells(1, 20);
   const std::array<std::size_t, 1> third{3};

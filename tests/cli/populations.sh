@@ -34,21 +34,45 @@ assert len(rows) == 24 and {r["group"] for r in rows} == {"one", "purkinje"}, ro
 assert "all total_length (µm)" in rows[0] and "all total_volume [diameters] (µm³)" in rows[0], list(rows[0])
 PY
 
-# A report is one file that loads nothing, and every plot in it is well-formed.
+# A report is one file that loads nothing; every plot in it is well-formed, no words lie over others or beyond the picture,
+# and axes of single values have two numbers or more, without which they are no scale.
 report_holds() {  # file, least number of plots
   /usr/bin/python3 - "$1" "$2" <<'PY'
 import re, sys
 import xml.etree.ElementTree as xml
+from collections import Counter
 text = open(sys.argv[1], encoding="utf-8").read()
+def place(plot):
+    picture = xml.fromstring(plot)
+    width, height = map(float, picture.get("viewBox").split()[2:])
+    boxes, numbers = [], Counter()
+    for t in picture.iter("{http://www.w3.org/2000/svg}text"):
+        if t.get("x") is None: continue  # upright
+        x, y, size, anchor = float(t.get("x")), float(t.get("y")), float(t.get("font-size")), t.get("text-anchor", "start")
+        long = .52 * size * len(t.text)  # of most typefaces
+        left = x - {"start": 0, "middle": .5, "end": 1}[anchor] * long
+        assert left > -2 and left + long < width + 2 and size < y + 4 and y < height, (sys.argv[1], "beyond the picture", t.text)
+        for other, x0, x1, y0 in boxes:
+            assert abs(y - y0) > .7 * size or left > x1 or left + long < x0, (sys.argv[1], "over one another", t.text, other)
+        boxes.append((t.text, left, left + long, y))
+        if anchor == "middle": numbers[y, (x + 10) // 300] += 1
+    if picture.get("aria-label") == "Values of single cells":
+        assert numbers and min(numbers.values()) >= 2, (sys.argv[1], numbers)
 plots = re.findall(r"<svg.*?</svg>", text, re.S)
 assert len(plots) >= int(sys.argv[2]), len(plots)
 for plot in plots:
     xml.fromstring(plot)
     assert "nan" not in re.sub(r">[^<]*<", "", plot).lower() and "inf" not in re.sub(r">[^<]*<", "", plot).lower(), plot[:300]
+    place(plot)
 assert not re.search(r'(src|href)\s*=|@import|url\(', text), "it loads something"
 PY
 }
 report_holds apart.html 5
+long=population_of_neurons_with_a_name_that_needs_the_whole_width_of_a_plot_and_more
+cp -r one "one_$long" && cp -r purkinje "two_$long"
+$BRAINFOREST compare "one_$long" "two_$long" $quick --report long.html >/dev/null
+report_holds long.html 5
+grep -q '>◂ larger in one_[a-z_]*…[a-z_]*<' long.html
 refuses 'is there' $BRAINFOREST compare one two $quick --report apart.html
 $BRAINFOREST compare one two $quick --report apart.html --force >/dev/null
 
@@ -86,7 +110,16 @@ grep -q 'in one, too' own.txt
 $BRAINFOREST typical purkinje/*-00000.swc --population all --report typical.html --json >typical.json
 told typical.json 'd["p"] <= .09 and d["metrics"][0]["abnormal"] and d["cells"] == 36'
 report_holds typical.html 1
+/usr/bin/python3 - <<'PY'
+import json
+d = json.load(open("typical.json"))
+metrics = [m for m in d["metrics"] if not m["name"].endswith(" is defined")]
+assert d["outside_of"] == len(metrics) and d["outside"] == sum(m["outside"] for m in metrics), (d["outside_of"], len(metrics))
+assert d["outside"] > d["outside_most"] >= d["outside_usual"] > 0 and d["outside_as_many"] == 0
+assert f"outside the range of all 36 cells in {d['outside']}, more than any of these cells" in d["sentence"], d["sentence"]
+PY
 $BRAINFOREST typical all/*-00003.swc --population all --json >member.json
+told member.json '"35 cells of all are too few to say whether it is typical" in d["sentence"] and d["outside"] <= d["outside_most"] and d["outside_as_many"] > 0'
 told member.json 'd["cells"] == 35 and 0 < d["p"] <= 1'  # the cell itself is no part of what it stands beside
 first=$(basename "$(ls one/*.swc | head -n 1)" .swc)
 $BRAINFOREST typical "$first" --repo cells.db --population one --json >stored.json
@@ -129,6 +162,21 @@ told judged.json 'list(d)[:10] == ["pass", "auc", "energy_p", "mmd_p", "ks_rejec
 told judged.json 'set(d["controls"]) == {"burke", "stretched", "jittered"} and all(c["rejected"] and c["by"] for c in d["controls"].values())'
 told judged.json '{"value", "lower", "upper"} <= set(d["auc"]["real_control"]) and d["copying"]["longest_run"] is None'
 report_holds judged.html 4
+# What is drawn is what was found, where the usual axis has no room for it, too.
+/usr/bin/python3 - <<'PY'
+import json, re
+auc = json.load(open("judged.json"))["auc"]
+plot = next(p for p in re.findall(r"<svg.*?</svg>", open("judged.html").read(), re.S) if "grown, structure" in p)
+text = {words: (float(x), float(y)) for x, y, words in re.findall(r'<text x="(.*?)" y="(.*?)".*?>(.*?)</text>', plot)}
+dots = {float(y): float(x) for x, y in re.findall(r'<circle cx="(.*?)" cy="(.*?)"', plot)}
+marks = sorted((float(words), x) for words, (x, y) in text.items() if re.fullmatch(r"[0-9.]+", words))
+(v0, x0), (v1, x1) = marks[0], marks[-1]
+assert min(auc[name]["lower"] for name in ("depth", "level")) < .4, auc
+for label, name in (("grown, structure", "structure"), ("grown, depth alone", "depth"), ("grown, level alone", "level"),
+                    ("real training cells, structure", "real_control")):
+    drawn = v0 + (dots[round(text[label][1] - 4, 1)] - x0) / (x1 - x0) * (v1 - v0)
+    assert abs(drawn - auc[name]["value"]) < .01, (label, drawn, auc[name])
+PY
 /usr/bin/python3 - <<'PY'
 import re
 page = open("judged.html").read()
