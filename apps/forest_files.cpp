@@ -65,6 +65,8 @@ bool holds_cells(const std::filesystem::path& file) {
 
 bool are_cells(std::span<const std::filesystem::path> files) {
   std::error_code none;
+  if (files.size() == 1 && std::filesystem::exists(files.front() / "circuit_config.json", none))
+    return false;  // a circuit, which Forest::open knows what to say of
   return files.size() > 1 || std::filesystem::is_directory(files.front(), none) || holds_cells(files.front());
 }
 

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -24,7 +26,7 @@ void add_surface(scene::Surfaces& surfaces, const std::filesystem::path& file, f
   surfaces.add(io::read_surface(MappedFile(file).text(), file.string()), opacity);
 }
 
-void add_overlay(scene::Surfaces& surfaces, const std::filesystem::path& file) {
+std::string add_overlay(scene::Surfaces& surfaces, const std::filesystem::path& file) {
   const std::string name = file.string();
   const io::SurfaceValues read = io::read_surface_values(MappedFile(file).text(), name);
   try {
@@ -34,7 +36,8 @@ void add_overlay(scene::Surfaces& surfaces, const std::filesystem::path& file) {
       const std::string title = read.title.empty() ? file.filename().string() : read.title;
       if (surfaces.title != title)  // of both hemispheres, often
         surfaces.title += (surfaces.title.empty() ? "" : ", ") + title;
-      return surfaces.colour(read.values);
+      surfaces.colour(read.values);
+      return read.title;
     }
     std::vector<scene::AreaColour> areas;
     for (const io::SurfaceLabel& label : read.labels) {
@@ -43,6 +46,7 @@ void add_overlay(scene::Surfaces& surfaces, const std::filesystem::path& file) {
       areas.push_back({label.key, scene::light_of(byte(0) << 16 | byte(1) << 8 | byte(2)), label.name});
     }
     surfaces.colour(read.values, areas);
+    return {};
   } catch (const InputError&) {
     throw;
   } catch (const Error& error) {
@@ -50,17 +54,21 @@ void add_overlay(scene::Surfaces& surfaces, const std::filesystem::path& file) {
   }
 }
 
-void add_surfaces(scene::Surfaces& surfaces, const SurfaceFiles& files) {
+std::set<std::string> add_surfaces(scene::Surfaces& surfaces, const SurfaceFiles& files) {
   if (files.overlays.size() > files.surfaces.size())
     throw Error(fmt::format(
         "more overlays ({}) than surfaces ({}) are given; an overlay colours the surface in its place",
         files.overlays.size(), files.surfaces.size()));
+  std::set<std::string> quantities;
   for (std::size_t i = 0; i < files.surfaces.size(); ++i) {
     const auto& opacities = files.opacities;
     add_surface(surfaces, files.surfaces[i],
                 opacities.empty() ? 1.f : opacities[std::min(i, opacities.size() - 1)]);
-    if (i < files.overlays.size()) add_overlay(surfaces, files.overlays[i]);
+    if (i >= files.overlays.size()) continue;
+    if (std::string quantity = add_overlay(surfaces, files.overlays[i]); !quantity.empty())
+      quantities.insert(std::move(quantity));
   }
+  return quantities;
 }
 
 }  // namespace forest

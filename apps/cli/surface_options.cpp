@@ -6,6 +6,7 @@
 
 #include <CLI/App.hpp>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "forest/core/error.h"
 #include "forest/core/number.h"
@@ -70,7 +71,12 @@ scene::Surfaces read_surfaces(const SurfaceOptions& options, Console& console) {
   if (!options.range.empty()) surfaces.range = parse_range(options.range);
   if (options.overlays.empty() && !(options.map.empty() && options.range.empty()))
     console.warn("--colour-map and --range are of the values of --overlay, and none is given");
-  forest::add_surfaces(surfaces, {options.files, options.overlays, options.opacities});
+  if (const auto quantities =
+          forest::add_surfaces(surfaces, {options.files, options.overlays, options.opacities});
+      quantities.size() > 1)
+    console.warn(
+        fmt::format("the overlays are of {}, and share one colour bar with one range; draw a picture of each",
+                    fmt::join(quantities, " and ")));
   if (options.opacities.size() > options.files.size())
     console.warn(fmt::format("{} of the opacities belong to no surface",
                              options.opacities.size() - options.files.size()));

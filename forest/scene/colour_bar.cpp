@@ -116,7 +116,7 @@ void paint(frame::Image& image, const ColourBar& bar, const Box& place, const Le
   letters.write(image, low, place.left, base);
   letters.write(image, high, place.right - letters.width(high), base);
   // Between them the threshold, or round values, where there is room.
-  const float apart = .8f * letters.height, end = place.right - letters.width(high) - apart;
+  const float apart = 1.3f * letters.height, end = place.right - letters.width(high) - apart;
   float begin = place.left + letters.width(low) + apart;
   const auto write = [&](float value) {
     const std::string text = fmt::format("{:g}", value);

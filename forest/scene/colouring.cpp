@@ -11,6 +11,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/srgb.h"
+#include "forest/scene/gallery.h"
 #include "forest/scene/view.h"
 
 namespace forest::scene {
@@ -252,7 +253,7 @@ class Painter {
       for (std::size_t layer = 0; layer < layers; ++layer)
         if (met[type * layers + layer]) {
           hue_of[type * layers + layer] = add_hue(
-              type_colour(type, steps > 1 ? float(step) / float(steps - 1) : .5f) * (light_ ? .6f : 1.f),
+              type_colour(type, steps > 1 ? float(step) / float(steps - 1) : .5f) * (light_ ? .7f : 1.f),
               circuit.types[type].name, false, steps > 1 ? circuit.layers[layer].name : "");
           ++step;
         }
@@ -273,9 +274,10 @@ class Painter {
     if (!somata.empty()) pia = std::max(pia, somata.high.y()), bottom = std::min(bottom, somata.low.y());
     const float deepest = told.empty() ? pia - bottom : float(std::ranges::max(told));
     const float step = std::max(deepest / float(depth_steps), 1e-3f);
+    const bool planted = !is_gallery(forest_);  // else nobody knows where the pia is
     for (std::size_t i = 0; i < depth_steps; ++i) {
       add_hue(on_background(layered_light(i, depth_steps)),
-              fmt::format("{:.0f}–{:.0f} µm deep", step * float(i), step * float(i + 1)));
+              planted ? fmt::format("{:.0f}–{:.0f} µm deep", step * float(i), step * float(i + 1)) : "");
     }
     return [this, first, pia, step, told](std::uint32_t i) {
       const float depth = told.empty() ? pia - forest_.instances()[i].y : float(told[i]);

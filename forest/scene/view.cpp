@@ -770,7 +770,7 @@ View within(View view, const Budget& budget) {
 }
 
 float fog_strength(const View& view) {
-  constexpr float on_light = .1f;
+  constexpr float on_light = .16f;
   return view.background == Background::light ? on_light * view.fog : view.fog;
 }
 

@@ -93,5 +93,10 @@ printf 'nan\n%.0s' $(seq 7320) >none.txt
 refuses "has no value that is a number" "$program" render lh.pial --overlay none.txt -o x.png
 "$program" render lh.pial --from above --view '{"background":"light"}' -o above.png --size 320x240 --renderer cpu --json >light.json
 told light.json 'd["view"]["background"] == "light"'
+# Values of two kinds in one picture: told.
+cp lh.curv lh.sulc
+"$program" render lh.pial --overlay lh.curv --surface lh.pial --overlay lh.sulc -o x.png --size 64x64 --json >two.json 2>/dev/null
+told two.json 'any("share one colour bar" in w for w in d["warnings"])'
+rm x.png
 refuses "both say where the eye is" "$program" render lh.pial --from above --view '{"eye":[0,0,9],"target":[0,0,0]}' -o x.png
 refuses "there are none; give --surface" "$program" render a.forest --from left -o x.png
