@@ -126,7 +126,7 @@ struct FilmPlan {
   std::uint32_t width = 1280, height = 720;
   std::optional<std::uint32_t> samples;  // of a pixel; none: 8, where something is seen through 32
   int frames_per_second = 25;
-  double seconds = 5.;
+  double seconds = 8.;
   std::optional<scene::Scanpath> gaze;  // replayed from its begin; none: that of the views
   std::filesystem::path pictures;       // when not empty: a folder for the single pictures as PNG files
   Marks marks{.legend = false};

@@ -16,6 +16,15 @@ float eased(float t) {
   return t * t * t * (t * (6.f * t - 15.f) + 10.f);
 }
 
+// Of a way at one speed but for a fifth of the time at both ends, in which it begins and ends: nowhere faster than 1.25 times the mean.
+float cruised(float t) {
+  constexpr float part = .2f;
+  t = std::clamp(t, 0.f, 1.f);
+  if (t > .5f) return 1.f - cruised(1.f - t);
+  const float x = std::min(t / part, 1.f), begun = part * x * x * x * (1.f - .5f * x);
+  return (begun + std::max(t - part, 0.f)) / (1.f - part);
+}
+
 // Barry & Goldman (1988): a Catmull–Rom curve with knots k0 < k1 < k2 < k3, between p1 and p2.
 Vec3 barry_goldman(const Vec3 p[4], const float k[4], float t) {
   const auto mix = [t](const Vec3& a, const Vec3& b, float from, float to) -> Vec3 {
@@ -42,7 +51,7 @@ CameraPath::CameraPath(std::vector<View> keys) : keys_(std::move(keys)) {
 
 View CameraPath::at(float t) const {
   if (keys_.size() == 1) return keys_[0];
-  const float u = eased(t);
+  const float u = cruised(t);
   std::size_t i = 1;
   while (i + 1 < keys_.size() && knots_[i] < u) ++i;
   // Ends are continued in a straight line.

@@ -13,7 +13,7 @@ class CameraPath {
  public:
   /// At least one view; throws Error otherwise.
   explicit CameraPath(std::vector<View> keys);
-  /// The view at time t in [0, 1], eased at both ends.
+  /// The view at time t in [0, 1]: at one speed, slow at both ends.
   View at(float t) const;
 
  private:
