@@ -47,6 +47,11 @@ fails_with 1 '1 of 2' $program check good.swc missing.swc
 fails_with 1 'missing.swc' $program measure good.swc missing.swc
 fails_with 1 'missing.swc' $program convert good.swc missing.swc --format swc --out converted
 cmp <($program measure good.swc --json) <($program measure converted/good.swc --json | sed 's/converted\///')
+# What cannot be said on standard error is lost, and nothing else.
+printf '1 1 0 0 0 5 -1\n2 3 0 5 0 0 1\n3 3 0 9 0 0 2\n' >thin.swc
+$program import thin.swc missing.swc --repo full.db >/dev/null 2>/dev/full && exit 1 || [ $? = 1 ]
+$program import thin.swc missing.swc --repo closed.db >/dev/null 2>&- && exit 1 || [ $? = 1 ]
+for repo in full closed; do $program list --repo $repo.db | grep -q thin; done
 mkdir folder && cp good.swc folder/ && touch folder/notes.txt folder/.hidden
 for verb in import check measure convert; do
   more=()
