@@ -338,7 +338,9 @@ TEST_F(Sonata, AWrongConfigurationIsNamed) {
     write_file(folder() / "circuit_config.json", R"({"brainforest": {}})");
     return says;
   };
-  EXPECT_THAT(spoil("\"version\"", "version"), HasSubstr("circuit_config.json:2: this is not JSON"));
+  EXPECT_THAT(spoil("\"version\"", "version"), HasSubstr("circuit_config.json:2: is no JSON"));
+  const std::string deep = "\"deep\": " + std::string(1000, '[') + std::string(1000, ']') + ", \"version\"";
+  EXPECT_THAT(spoil("\"version\"", deep.c_str()), HasSubstr("more than 32 brackets"));
   EXPECT_THAT(spoil("\"networks\"", "\"network\""), HasSubstr("has no \"networks\""));
   EXPECT_THAT(spoil("\".\"", "\"$BASE_DIR\""), HasSubstr("not define"));
   EXPECT_THAT(spoil("\".\"", "\"$BASE_DIR/$BASE_DIR\""), HasSubstr("without end"));
