@@ -10,6 +10,8 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/core/file.h"
+#include "forest/core/json.h"
 #include "forest/core/parallel.h"
 #include "forest/io/hdf5.h"
 #include "forest/io/new_folder.h"
@@ -37,7 +39,9 @@ void must_take_sonata(const fs::path& folder) {
   if (fs::is_empty(folder)) return;
   const auto ours = [&] {
     try {
-      return SonataConfig::find(SonataConfig(folder).json(), sonata_our_key) != nullptr;
+      const fs::path config = folder / sonata_config_name;
+      const auto json = parse_json<Json>(MappedFile(config).text(), config.string(), "");
+      return SonataConfig::find(json, sonata_our_key) != nullptr;
     } catch (const InputError&) {
       return false;
     }
