@@ -29,6 +29,16 @@ fails_with 2 "'foo' is none of auto, cpu, opengl" $program render x.forest -o x.
 fails_with 2 "'blue' is none of sign, target" $program render x.forest -o x.png --synapse-colour blue
 fails_with 2 "'nan' is no number from 0 to 1" $program render x.forest -o x.png --gaze nan .5
 fails_with 2 'what is given is empty; give a value, or leave the option out' $program render x.forest -o x.png --view ''
+for command in 'import' 'check' 'convert' 'convert --format swc --out x'; do
+  fails_with 2 'what is given is empty' $program $command ''
+done
+fails_with 2 "'nan' is no number from 0.001 to 1000" $program fetch --query x:y --out x --rate nan
+fails_with 2 "'nan' is no number from 1 to 3600" $program fetch --query x:y --out x --timeout nan
+fails_with 2 "'nan' is no number from 0 to 1000" $program convert a.swc b.ply --detail nan
+fails_with 2 "'nan' is no number from" $program raster x.activity -o x.png --to nan
+long=$(printf 'a%.0s' {1..300})
+fails_with 1 'File name too long; check the path, and who may read and write there' $program list --repo $long
+fails_with 1 'File name too long; check the path, and who may read and write there' $program import x.swc --repo $long
 fails_with 2 'what is given is empty; give a value, or leave the option out' $program cortex surfaces x.svg --out ''
 for benchmark in activity pick targets; do
   $program bench $benchmark --help | grep -q "brainforest bench $benchmark --neurons"
