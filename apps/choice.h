@@ -24,14 +24,14 @@ CLI::Validator one_of(const std::map<std::string, T>& words) {
       std::string());
 }
 
-/// For all named options of a command line and of what is below it, once they are there: '' is refused, for it is a variable of a script
+/// For all that a command line and what is below it may be given, once it is there: '' is refused, for it is a variable of a script
 /// that was never set.
 inline void refuse_empty(CLI::App& command) {
   const auto empty = [](const std::string& text) {
     return text.empty() ? "what is given is empty; give a value, or leave the option out" : std::string();
   };
   for (CLI::Option* option : command.get_options())
-    if (!option->get_positional() && option->get_expected_max() > 0) option->check(empty);
+    if (option->get_expected_max() > 0) option->check(empty);
   for (CLI::App* below : command.get_subcommands([](const CLI::App*) { return true; })) refuse_empty(*below);
 }
 

@@ -3,32 +3,17 @@
 
 #include <algorithm>
 
-#include <fmt/format.h>
-#include <nlohmann/json.hpp>
-
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 
 namespace forest {
 
-scene::View view_of(std::string_view text, const std::string& name, const Vec3& up,
-                    const scene::View* whole) {
-  try {
-    [[maybe_unused]] const auto json = nlohmann::json::parse(text);
-  } catch (const nlohmann::json::parse_error& error) {
-    throw no_json(text, error.byte, name, "correct what stands there or before, as docs/scene/view.md shows");
-  } catch (const nlohmann::json::exception&) {
-    throw InputError(name, 1, "holds a number too large for any view; write it smaller");
-  }
-  return scene::parse_view(text, name, up, whole);
-}
-
 scene::View read_view(const std::string& file_or_text, const Vec3& up, const scene::View* whole) {
   const std::size_t first = file_or_text.find_first_not_of(" \t\r\n");
   if (first != std::string::npos && file_or_text[first] == '{')
-    return view_of(file_or_text, "--view", up, whole);
+    return scene::parse_view(file_or_text, "--view", up, whole);
   const MappedFile file(file_or_text);
-  return view_of(file.text(), file_or_text, up, whole);
+  return scene::parse_view(file.text(), file_or_text, up, whole);
 }
 
 std::vector<scene::View> read_views(const std::string& name, const Vec3& up, const scene::View* whole) {
@@ -41,7 +26,7 @@ std::vector<scene::View> read_views(const std::string& name, const Vec3& up, con
     text.remove_prefix(std::min(end + 1, text.size()));
     if (row.find_first_not_of(" \t\r") == row.npos) continue;
     try {
-      views.push_back(view_of(row, name, up, whole));
+      views.push_back(scene::parse_view(row, name, up, whole));
     } catch (const InputError& error) {
       throw InputError(name, line, error.sentence());
     }

@@ -3,18 +3,13 @@
 #pragma once
 
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "forest/scene/view.h"
 
 namespace forest {
 
-/// As scene::parse_view, as are the others; text that is no JSON is refused with its line and column.
-scene::View view_of(std::string_view text, const std::string& name, const Vec3& up,
-                    const scene::View* whole = nullptr);
-
-/// A view from a file, or from the text itself when it begins with '{'. Throws InputError.
+/// As scene::parse_view: a view from a file, or from the text itself when it begins with '{'. Throws InputError.
 scene::View read_view(const std::string& file_or_text, const Vec3& up, const scene::View* whole = nullptr);
 
 /// Views one after the other, as the studio records them: one on each line of the file. Throws InputError with the line.

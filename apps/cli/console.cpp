@@ -11,6 +11,7 @@
 #include <sys/resource.h>
 
 #include "forest/core/file.h"
+#include "forest/core/standard_error.h"
 
 namespace forest::cli {
 
@@ -32,7 +33,7 @@ void ProgressBar::advance(std::size_t steps) {
 
 void ProgressBar::end() {
   const std::lock_guard lock(mutex_);
-  if (shown_) fmt::print(stderr, "\r\033[K"), std::fflush(stderr);
+  if (shown_) tell("\r\033[K");
   shown_ = false;
 }
 
@@ -42,33 +43,37 @@ void ProgressBar::draw(Clock::time_point now) {
   if (!terminal) {  // a line a minute, for who reads the log of a long run
     if (now - told_ < 60s) return;
     told_ = now;
-    fmt::print(stderr, "{}: {}{}\n", stage_, done_, total_ ? fmt::format(" of {}", total_) : "");
+    tell(fmt::format("{}: {}{}\n", stage_, done_, total_ ? fmt::format(" of {}", total_) : ""));
     return;
   }
   constexpr std::size_t width = 30;
   if (total_) {
     const std::size_t filled = std::min(width, width * done_ / total_);
-    fmt::print(stderr, "\r\033[K{:<12} {}{} {}/{}", stage_, std::string(filled, '#'),
-               std::string(width - filled, '.'), done_, total_);
+    tell(fmt::format("\r\033[K{:<12} {}{} {}/{}", stage_, std::string(filled, '#'),
+                     std::string(width - filled, '.'), done_, total_));
   } else {
-    fmt::print(stderr, "\r\033[K{:<12} {}", stage_, done_);
+    tell(fmt::format("\r\033[K{:<12} {}", stage_, done_));
   }
-  std::fflush(stderr);
   shown_ = true;
 }
 
 // A file that was sent to standard output has it for itself.
-static std::FILE* output() { return standard_output_taken() ? stderr : stdout; }
+static void put(std::string_view text) {
+  if (standard_output_taken())
+    tell(text);
+  else
+    fmt::print("{}", text);
+}
 
 void Console::say(std::string_view line) {
   bar_.end();
-  if (!json) fmt::print(output(), "{}\n", line);
+  if (!json) put(fmt::format("{}\n", line));
 }
 
 void Console::warn(std::string_view sentence) {
   bar_.end();
   std::fflush(stdout);  // in one file or pipe with what was said before
-  fmt::print(stderr, "{}\n", sentence);
+  tell(fmt::format("{}\n", sentence));
   warnings_.emplace_back(sentence);
 }
 
@@ -76,7 +81,7 @@ void Console::print(nlohmann::ordered_json value) {
   bar_.end();
   if (!json) return;
   if (value.is_object() && !warnings_.empty() && !value.contains("warnings")) value["warnings"] = warnings_;
-  fmt::print(output(), "{}\n", value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  put(value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
 }
 
 void Console::table(const std::vector<std::string>& header,
@@ -108,7 +113,7 @@ void Console::table(const std::vector<std::string>& header,
       line += "  ";
     }
     line.erase(line.find_last_not_of(' ') + 1);
-    fmt::print(output(), "{}\n", line);
+    put(line + "\n");
   };
   print(header);
   for (const auto& row : rows) print(row);

@@ -89,12 +89,13 @@ std::vector<fs::path> places_of(const io::CellReader& cells, const fs::path& to,
   });
   std::vector<fs::path> places;
   std::set<fs::path> taken;
+  std::map<fs::path, int> last;  // number that a name was given
   for (std::size_t i = 0; i < cells.count; ++i) {
     const std::string cell = names[i].empty() ? std::to_string(i + 1) : repository::file_name(names[i]);
     const fs::path wanted = to.parent_path() / (to.stem().string() + "-" + cell + to.extension().string());
     fs::path place = wanted;
-    for (int number = 2; others.contains(place) || !taken.insert(place).second; ++number)
-      place = numbered(wanted, number);
+    int& number = last.try_emplace(wanted, 1).first->second;
+    while (others.contains(place) || !taken.insert(place).second) place = numbered(wanted, ++number);
     places.push_back(std::move(place));
   }
   return places;
@@ -193,6 +194,7 @@ std::vector<fs::path> targets(const Options& options, const std::vector<fs::path
                               std::string_view extension, Console& console) {
   std::vector<fs::path> targets;
   std::map<fs::path, fs::path> taken;
+  std::map<fs::path, int> last;  // number that a name was given
   for (const fs::path& file : files) {
     fs::path below = file.filename();
     for (const std::string& named : options.files)
@@ -202,7 +204,8 @@ std::vector<fs::path> targets(const Options& options, const std::vector<fs::path
           below = relative;
     const fs::path wanted = options.out / below.replace_extension(std::string(extension));
     fs::path to = wanted;
-    for (int number = 2; !taken.try_emplace(to, file).second; ++number) to = numbered(wanted, number);
+    int& number = last.try_emplace(wanted, 1).first->second;
+    while (!taken.try_emplace(to, file).second) to = numbered(wanted, ++number);
     if (to != wanted)
       console.warn(fmt::format("{}: becomes {}, for {} becomes {}", escaped(file.string()),
                                escaped(to.string()), escaped(taken[wanted].string()),
@@ -423,17 +426,15 @@ std::function<void()> convert(CLI::App& command, Console& console) {
   command.add_option("--sides", options->model.sides, "Of a model's cylinders")
       ->check(CLI::Range(3, 64))
       ->capture_default_str();
-  command
-      .add_option("--detail", options->model.detail,
-                  "Grid of a model's surface in µm; 0 chooses by the thinnest branch")
-      ->check(CLI::Range(0.f, 1000.f))
-      ->capture_default_str();
+  must_be_within(*command
+                      .add_option("--detail", options->model.detail,
+                                  "Grid of a model's surface in µm; 0 chooses by the thinnest branch")
+                      ->capture_default_str(),
+                 0., 1000.);
   command.add_flag("--verbose", options->verbose, "Show every oddity of the files that are read");
   add_force(command, options->force);
   command.parse_complete_callback([options] {
     std::error_code none;
-    for (const std::string& file : options->files)
-      if (file.empty()) throw CLI::ValidationError("the name of a file is empty; is a variable unset?");
     if (options->out.empty() && (options->files.size() != 2 || fs::is_directory(options->files[0], none)))
       throw CLI::ValidationError(
           "say where the files go: convert A B for two files, or --format NAME --out DIR for many");

@@ -245,17 +245,18 @@ std::function<void()> fetch_cells(CLI::App& command, Console& console) {
       command.add_flag("--offline", options->cache.offline, "Use the cache and no network");
   command.add_flag("--refresh", options->cache.refresh, "Ask whether what is in the cache has changed")
       ->excludes(offline);
-  command.add_option("--rate", options->manners.rate, "Requests a second at most")
-      ->check(CLI::Range(.001, 1000.))
-      ->capture_default_str();
+  must_be_within(*command.add_option("--rate", options->manners.rate, "Requests a second at most")
+                      ->capture_default_str(),
+                 .001, 1000.);
   must_be_whole(*command
                      .add_option("--retries", options->cache.patience.retries,
                                  "How often to ask again when a transfer breaks off")
                      ->capture_default_str(),
                 0, 20);
-  command.add_option("--timeout", options->manners.timeout, "Seconds to wait for a silent server")
-      ->check(CLI::Range(1., 3600.))
-      ->capture_default_str();
+  must_be_within(
+      *command.add_option("--timeout", options->manners.timeout, "Seconds to wait for a silent server")
+           ->capture_default_str(),
+      1., 3600.);
   must_be_whole(
       *command.add_option("--max-size", options->max_megabytes, "Largest file in MB")->capture_default_str(),
       1, 100'000);

@@ -10,6 +10,7 @@
 #include "forest/core/heap.h"
 #include "forest/core/parallel.h"
 #include "forest/core/signals.h"
+#include "forest/core/standard_error.h"
 #include "forest/repository/names.h"
 
 #include "apps/choice.h"
@@ -38,6 +39,7 @@ std::string missing_verb(const CLI::App& app) {
 
 int main(int argc, char** argv) {
   using namespace forest;
+  keep_standard_streams();
   keep_freed_memory();
   say_signals("brainforest");
   cli::Console console;

@@ -176,8 +176,12 @@ std::function<void()> raster(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
   command.add_option("activity", options->file, "Activity file")->required();
   add_size(command, options->size);
-  command.add_option("--from", options->from, "The first time that is shown, ms; by default all");
-  command.add_option("--to", options->to, "The time before which it ends, ms");
+  constexpr double furthest = 1e15;  // ms
+  must_be_within(
+      *command.add_option("--from", options->from, "The first time that is shown, ms; by default all"),
+      -furthest, furthest);
+  must_be_within(*command.add_option("--to", options->to, "The time before which it ends, ms"), -furthest,
+                 furthest);
   command
       .add_option(
           "--range", options->range,

@@ -12,6 +12,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/core/lower.h"
 #include "forest/core/parallel.h"
 #include "forest/io/workbook.h"
 #include "forest/statistics/metric.h"
@@ -235,8 +236,7 @@ std::vector<TableSheet> sheets_of(Repository& repository, const std::vector<repo
 }
 
 std::vector<std::filesystem::path> table_files(const std::filesystem::path& out, bool csv) {
-  std::string extension = out.extension().string();
-  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c;
+  const std::string extension = lower(out.extension().string());
   if (!csv && extension != ".xlsx")
     throw Error(fmt::format("{}: a workbook's name ends in .xlsx; change the name, or choose --format csv",
                             out.string()));

@@ -88,8 +88,7 @@ void define(const std::string& said, scene::Targets& targets, Console& console) 
 
 void remove(const std::string& name, scene::Targets& targets) {
   circuit::NodeSets sets = targets.sets();
-  if (!std::erase_if(sets.sets, [&](const circuit::NodeSet& set) { return set.name == name; }))
-    throw Error(fmt::format("there is no node set '{}' to remove", name));
+  if (!sets.remove(name)) throw Error(fmt::format("there is no node set '{}' to remove", name));
   targets.use(std::move(sets));
 }
 

@@ -15,6 +15,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/signals.h"
+#include "forest/core/standard_error.h"
 
 #include "apps/choice.h"
 #include "apps/drawer.h"
@@ -173,6 +174,7 @@ int run(const Options& options, int& argc, char** argv) {
 
 int main(int argc, char** argv) {
   using namespace forest::studio;
+  forest::keep_standard_streams();
   forest::say_signals("brainforest-studio");
   Options options;
   CLI::App app{"A window on a forest: orbit, fly, and ask any branch what it is.", "brainforest-studio"};

@@ -392,8 +392,8 @@ void Window::paste_view() {
   try {
     Settings settings = viewport_->settings();
     set_view(settings,
-             view_of(QApplication::clipboard()->text().toStdString(), "clipboard",
-                     viewport_->forest().circuit().up),
+             scene::parse_view(QApplication::clipboard()->text().toStdString(), "clipboard",
+                               viewport_->forest().circuit().up),
              viewport_->forest().soma_bounds().centre());
     viewport_->change(settings);
   } catch (const std::exception& error) {

@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "forest/core/distinct.h"
 #include "forest/core/error.h"
 #include "forest/core/lower.h"
 #include "forest/core/number.h"
@@ -74,7 +75,7 @@ class Resolver {
     path_.push_back(name);
     Members result;
     if (set->compound)
-      for (const std::string& other : set->of) result = united(result, of(other));
+      result = of_others(*set);
     else
       result = of_clauses(*set);
     path_.pop_back();
@@ -83,6 +84,16 @@ class Resolver {
 
  private:
   [[noreturn]] void refuse(const std::string& sentence) const { throw InputError(sets_.source, 0, sentence); }
+
+  Members of_others(const NodeSet& set) {
+    Members result;
+    for (const std::string& other : set.of) {
+      const Members& more = of(other);
+      result.insert(result.end(), more.begin(), more.end());
+      if (result.size() > 2 * table_.count) result = distinct(std::move(result));
+    }
+    return distinct(std::move(result));
+  }
 
   Members of_clauses(const NodeSet& set) const {
     std::vector<bool> inside(table_.count, true);
@@ -281,16 +292,26 @@ class Reader {
 }  // namespace
 
 const NodeSet* NodeSets::find(std::string_view name) const {
-  const auto found = std::ranges::find(sets, name, &NodeSet::name);
-  return found == sets.end() ? nullptr : &*found;
+  if (places.size() != sets.size()) {
+    places.clear();
+    for (std::size_t i = 0; i < sets.size(); ++i) places.emplace(sets[i].name, i);
+  }
+  const auto found = places.find(name);
+  return found == places.end() ? nullptr : &sets[found->second];
 }
 
 void NodeSets::put(NodeSet set) {
-  const auto found = std::ranges::find(sets, set.name, &NodeSet::name);
-  if (found == sets.end())
+  if (const NodeSet* const there = find(set.name)) {
+    sets[std::size_t(there - sets.data())] = std::move(set);
+  } else {
+    places.emplace(set.name, sets.size());
     sets.push_back(std::move(set));
-  else
-    *found = std::move(set);
+  }
+}
+
+bool NodeSets::remove(std::string_view name) {
+  places.clear();
+  return std::erase_if(sets, [&](const NodeSet& set) { return set.name == name; }) > 0;
 }
 
 Members members(const NodeSets& sets, std::string_view name, const NodeTable& table) {

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -42,9 +43,13 @@ struct NodeSets {
   std::string source = "node sets";  // the file, for errors
   std::vector<NodeSet> sets;
 
-  const NodeSet* find(std::string_view name) const;  // null: not there
+  const NodeSet* find(std::string_view name) const;  // null: not there; of two the first
   /// Adds a set, or replaces that of its name.
   void put(NodeSet set);
+  bool remove(std::string_view name);  // whether it was there
+
+  /// Where find() found each name: there may be a hundred thousand. It sees by their number that sets were added otherwise.
+  mutable std::map<std::string, std::size_t, std::less<>> places{};
 };
 
 /// What is known of each node by one name: a word (by its index in `words`) or a number.

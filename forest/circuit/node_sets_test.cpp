@@ -90,6 +90,24 @@ TEST(NodeSets, CompoundsAreUnionsAndCirclesAreNamed) {
               ElementsAre(0, 1, 2, 4));  // what is wrong elsewhere does not matter
 }
 
+TEST(NodeSets, MayBeManyAndAreAddedAndTakenOut) {
+  constexpr std::size_t many = 100'000;
+  NodeSets sets;
+  NodeSet whole{.name = "whole", .clauses = {}, .of = {}, .compound = true};
+  for (std::size_t i = 0; i < many; ++i) {  // of each of which a walk through all would take minutes
+    sets.put(
+        {.name = std::to_string(i), .clauses = {{"node_id", Ask::any_of, {}, {double(i % 6)}}}, .of = {}});
+    whole.of.push_back(std::to_string(i));
+  }
+  sets.sets.push_back(whole);
+  EXPECT_EQ(members(sets, "whole", six()).size(), 6u);
+  for (std::size_t i = 0; i < many; ++i) ASSERT_EQ(sets.find(std::to_string(i)), &sets.sets[i]);
+  EXPECT_TRUE(sets.remove("3"));
+  EXPECT_FALSE(sets.remove("3"));
+  EXPECT_EQ(sets.find("3"), nullptr);
+  EXPECT_EQ(sets.find("4"), &sets.sets[3]);
+}
+
 TEST(NodeSets, HostileOnesEndWithASentence) {
   NodeSets sets;
   for (int i = 0; i < 5000; ++i)  // a chain

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/core/lower.h"
 
 namespace forest::fetch {
 namespace {
@@ -107,9 +108,7 @@ std::string Addresses::page(const std::vector<std::string>& conditions, std::siz
 }
 
 std::string Addresses::swc(std::string_view archive, std::string_view name) const {
-  std::string folder(piece(archive, "the archive"));
-  for (char& c : folder)
-    if (c >= 'A' && c <= 'Z') c = char(c - 'A' + 'a');
+  const std::string folder = lower(piece(archive, "the archive"));
   return fmt::format("{}/dableFiles/{}/CNG%20version/{}.CNG.swc", base_, encoded(folder),
                      encoded(piece(name, "the name")));
 }

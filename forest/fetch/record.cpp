@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
+#include "forest/core/json.h"
 #include "forest/core/lower.h"
 
 namespace forest::fetch {
@@ -15,19 +16,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int max_depth = 32;  // a record is three deep; writing JSON again recurses
-
 Json parse(std::string_view text, const std::string& source) {
-  try {
-    return Json::parse(text, [&](int depth, Json::parse_event_t, Json&) {
-      if (depth > max_depth)
-        throw InputError(source, 0, "the JSON is nested too deeply; check the service's address");
-      return true;
-    });
-  } catch (const Json::exception&) {
-    throw InputError(source, 0,
-                     "the answer is not JSON; check the service's address, or try again when it is well");
-  }
+  return parse_json<Json>(text, source, "check the service's address, or try again when it is well");
 }
 
 const Json* find(const Json& object, const char* key) {

@@ -76,13 +76,14 @@ TEST(Record, StrangeAnswersAreSaid) {
   const auto error_of = [](const std::string& text) {
     return refused<InputError>([&] { (void)parse_record(text, "address"); });
   };
-  EXPECT_THAT(error_of("<html>login</html>"), HasSubstr("address: the answer is not JSON"));
+  EXPECT_THAT(error_of("<html>login</html>"),
+              HasSubstr("address:1: is no JSON from column 1 on; check the service"));
   for (const char* text : {"[]", "null", "7", "{}", R"({"neuron_name":7})", R"({"neuron_name":""})"})
     EXPECT_THAT(error_of(text), HasSubstr("no neuron")) << text;
   EXPECT_THAT(error_of(std::string(100'000, '[')), HasSubstr("deep"));
   EXPECT_THAT(error_of(R"({"neuron_name":"a","x":)" + std::string(100, '[') + std::string(100, ']') + "}"),
               HasSubstr("deep"));
-  EXPECT_THAT(error_of("{\"neuron_name\":\"\xff\xfe\"}"), HasSubstr("not JSON"));
+  EXPECT_THAT(error_of("{\"neuron_name\":\"\xff\xfe\"}"), HasSubstr("no JSON"));
   EXPECT_THROW(parse_page(R"({"_embedded":{"neuronResources":{}},"page":{}})", "address"), InputError);
   EXPECT_THROW(parse_page("[]", "address"), InputError);
 }

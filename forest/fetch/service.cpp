@@ -10,6 +10,7 @@
 #include "forest/core/byte_order_mark.h"
 #include "forest/core/error.h"
 #include "forest/core/hash.h"
+#include "forest/core/lower.h"
 
 namespace forest::fetch {
 namespace {
@@ -17,10 +18,7 @@ namespace {
 constexpr std::size_t page_size = 100;       // the service gives 500 at most
 constexpr std::size_t max_json = 32u << 20;  // bytes; a record has some two thousand
 
-bool same_letters(std::string_view a, std::string_view b) {
-  const auto low = [](char c) { return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c; };
-  return std::ranges::equal(a, b, {}, low, low);
-}
+bool same_letters(std::string_view a, std::string_view b) { return lower(a) == lower(b); }
 
 }  // namespace
 

@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
+#include "forest/core/json.h"
 #include "forest/core/number.h"
 #include "forest/io/plain_text.h"
 #include "forest/io/words.h"
@@ -103,15 +104,10 @@ void sort_sections(ContourStack& stack, const std::string& name, std::string_vie
 
 class JsonReader {
  public:
-  JsonReader(std::string_view text, const std::string& name) : name_(name) {
-    try {
-      json_ = json::parse(text);
-    } catch (const json::parse_error& error) {
-      throw no_json(text, error.byte, name, "get the whole file, or write it again");
-    } catch (const json::exception&) {
-      throw InputError(name, 0, "holds a number too large for any place; correct it");
-    }
-  }
+  JsonReader(std::string_view text, const std::string& name)
+      : name_(name),
+        json_(parse_json<json>(text, name, "get the whole file, or write it again",
+                               {.most_members = std::size_t(-1)})) {}
 
   ReadContours read() const {
     if (!json_.is_object()) fail("is no stack of contours; give a .contours, .jser, .slc or .svg file");

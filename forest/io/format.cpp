@@ -8,6 +8,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/core/lower.h"
 #include "forest/io/acc.h"
 #include "forest/io/asc.h"
 #include "forest/io/cells.h"
@@ -140,11 +141,7 @@ constexpr std::array table{
            .keeps = {}},
 };
 
-std::string lower_extension(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c;
-  return extension;
-}
+std::string lower_extension(const std::filesystem::path& path) { return lower(path.extension().string()); }
 
 bool has(const Format& format, std::string_view extension) {
   return std::ranges::find(format.extensions, extension) != format.extensions.end();
@@ -201,10 +198,8 @@ void refuse_other_kinds(std::string_view bytes, const std::string& name) {
   if (bytes.empty()) throw InputError(name, 0, "is empty; copy or export it again");
   if (bytes.starts_with(apple_double))
     throw NotANeuron(name, 0, "holds what macOS notes beside a file, not the file; remove it");
-  const auto same = [](char a, char b) { return (a >= 'A' && a <= 'Z' ? char(a - 'A' + 'a') : a) == b; };
   for (const Beginning& row : beginnings)
-    if (bytes.size() >= row.bytes.size() &&
-        std::ranges::equal(bytes.substr(0, row.bytes.size()), row.bytes, same))
+    if (lower(bytes.substr(0, row.bytes.size())) == row.bytes)
       throw InputError(name, 0, std::string(row.sentence));
 }
 

@@ -86,6 +86,8 @@ class Members {
   std::optional<Image::Object> find(std::string_view name) const {
     const auto link = std::ranges::lower_bound(links_, name, {}, &Image::Link::name);
     if (link == links_.end() || link->name != name) return std::nullopt;
+    if (link->address == Image::Link::soft)
+      image_.refuse(fmt::format("{} is a soft link, which is not followed; put there what it names", name));
     return image_.open(link->address);
   }
   bool has(std::string_view name) const {
@@ -624,6 +626,7 @@ class CellReader {
   void read_organelles(const Members& organelles) {
     std::string others;
     for (const Image::Link& link : organelles.links()) {
+      if (link.address == Image::Link::soft) continue;
       const auto row =
           std::ranges::find(organelle_tables, std::string_view(link.name), &OrganelleTable::group);
       const Image::Object group = image_.open(link.address);
@@ -754,7 +757,8 @@ void cells(const Image& image, Visit visit) {
     }
     const auto& links = members.links();
     for (std::size_t i = links.size(); i-- > 0;)
-      stack.push_back({root ? links[i].name : place.name + '/' + links[i].name, links[i].address});
+      if (links[i].address != Image::Link::soft)
+        stack.push_back({root ? links[i].name : place.name + '/' + links[i].name, links[i].address});
   }
 }
 

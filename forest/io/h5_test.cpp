@@ -15,6 +15,7 @@
 #include "forest/morphology/measure.h"
 
 #include "tests/real_data.h"
+#include "tests/refused.h"
 #include "tests/zoo.h"
 
 namespace forest::io {
@@ -325,6 +326,22 @@ TEST(H5, EveryLayoutOfTheLibraryHoldsTheSameNeuron) {
   EXPECT_EQ(annotation(organelles, "mitochondrion"), "-1 0 0.5 10 1 0.2 3");
   EXPECT_EQ(annotation(organelles, "endoplasmic_reticulum"), "1 0.5 2 1");
   EXPECT_EQ(annotation(read(folder / "spine_density.h5").morphology, "postsynaptic_density"), "1 0 0.5");
+}
+
+TEST(H5, BehindAUserBlockIsReadAsWithout) {
+  const Morphology m = read(FOREST_SOURCE_DIR "/fuzz/corpus/h5/user_block.h5").morphology;
+  EXPECT_EQ(m.soma().points.size(), 3u);
+  EXPECT_EQ(m.sections().size(), 1u);
+}
+
+TEST(H5, OfWhichAPartIsNotThereIsRefused) {
+  const auto sentence = [](const std::string& name) {
+    return refused<InputError>([&] { read(FOREST_SOURCE_DIR "/fuzz/corpus/h5/" + name); });
+  };
+  for (const std::string version : {"", "newest_"}) {
+    EXPECT_THAT(sentence(version + "unwritten.h5"), testing::HasSubstr("lacks 1 of 3 pieces of an array"));
+    EXPECT_THAT(sentence(version + "soft_link.h5"), testing::HasSubstr("points is a soft link"));
+  }
 }
 
 TEST(H5RealData, Version2AndContainersHoldTheSameCells) {

@@ -99,6 +99,23 @@ void check_claim(const File& owner, const std::string& path, std::size_t count, 
                              path, count));
 }
 
+/// The library crashes where a damaged header says that the array lies within it, or in one piece, and is of another size, or
+/// that it lies beyond the end.
+void check_piece(const File& owner, const std::string& path, hid_t set, hid_t type, std::size_t count,
+                 std::uintmax_t file_bytes) {
+  const Properties made(H5Dget_create_plist(set));
+  const H5D_layout_t layout = made.good() ? H5Pget_layout(made) : H5D_LAYOUT_ERROR;
+  if ((layout != H5D_COMPACT && layout != H5D_CONTIGUOUS) || H5Tis_variable_str(type) > 0 ||
+      kind_of(type) == Kind::other)
+    return;
+  const haddr_t begin = layout == H5D_COMPACT ? 0 : H5Dget_offset(set);
+  const std::uintmax_t size = count * H5Tget_size(type);
+  if (begin != HADDR_UNDEF &&  // which it is of one that was never written
+      (H5Dget_storage_size(set) != size || size > file_bytes || begin > file_bytes - size))
+    owner.refuse(fmt::format("array {} should have {} values, and other bytes are there; the file is damaged",
+                             path, count));
+}
+
 /// A dataset with its type and length, both checked.
 struct Array {
   Array(const File& owner, hid_t file, const std::string& path, std::uintmax_t file_bytes)
@@ -115,6 +132,7 @@ struct Array {
           fmt::format("array {} has a shape other than a single row of values; write it as one", path));
     count = std::size_t(points);
     check_claim(owner, path, count, type, file_bytes);
+    check_piece(owner, path, set, type, count, file_bytes);
   }
 
   Dataset set;

@@ -200,8 +200,9 @@ Image::Image(std::string_view bytes, const std::string& name) : bytes_(bytes), n
     refuse(
         fmt::format("has addresses of {} bytes instead of 8; write it again with `h5repack`", offset_size));
   block.skip(version == 0 ? 9 : version == 1 ? 13 : 1);
-  block.skip(8 + 8);  // the base address, free space or the superblock's extension
-  const std::uint64_t end = block.eight();
+  const std::uint64_t base = block.eight();  // behind the user block; all other addresses count from there
+  block.skip(8);                             // free space or the superblock's extension
+  const std::uint64_t end = block.eight() - base;
   if (version < 2) block.skip(8 + 8);  // the driver's block, the name of the root
   root_ = block.eight();
   if (end > bytes_.size())
@@ -272,8 +273,7 @@ std::vector<Image::Link> Image::links(const Object& group) const {
   std::vector<Link> links;
   for (const Message& message : group.messages) {
     if (message.type == symbols_message) symbols(message.data, links);
-    if (message.type == link_message)
-      if (auto one = link(message.data)) links.push_back(std::move(*one));
+    if (message.type == link_message) links.push_back(link(message.data));
     if (message.type == link_info_message) dense_links(message.data, links);
   }
   std::ranges::sort(links, {}, &Link::name);
@@ -308,7 +308,7 @@ void Image::symbols(std::string_view message, std::vector<Link>& links) const {
         entries.skip(24);
         if (name >= names.size()) damaged(what);
         const std::string_view text = names.substr(std::size_t(name));
-        if (object != nowhere) links.push_back({std::string(text.substr(0, text.find('\0'))), object});
+        links.push_back({std::string(text.substr(0, text.find('\0'))), object});
       }
       if (links.size() > bytes_.size()) damaged(what);
       continue;
@@ -330,15 +330,14 @@ void Image::symbols(std::string_view message, std::vector<Link>& links) const {
   }
 }
 
-std::optional<Image::Link> Image::link(std::string_view message) const {
+Image::Link Image::link(std::string_view message) const {
   Cursor fields(*this, message, "a link of a group");
   if (fields.byte() != 1) damaged("a link of a group");
   const std::uint8_t flags = fields.byte();
   const std::uint8_t kind = flags & 8 ? fields.byte() : 0;
   fields.skip((flags & 4 ? 8 : 0) + (flags & 16 ? 1 : 0));
   const std::string_view name = fields.take(fields.number(std::size_t(1) << (flags & 3)));
-  if (kind != 0) return std::nullopt;
-  return Link{std::string(name), fields.eight()};
+  return Link{std::string(name), kind == 0 ? fields.eight() : Link::soft};
 }
 
 /// A group of the second kind with many members: link messages in a fractal heap, found by a B-tree of version 2.
@@ -409,8 +408,7 @@ void Image::dense_links(std::string_view message, std::vector<Link>& links) cons
     fields.skip(2);
     for (std::size_t i = 0; i < node.count; ++i) {
       fields.skip(4);  // the name's hash
-      if (auto one = link(heap_object(objects, fields.take(objects.id_size))))
-        links.push_back(std::move(*one));
+      links.push_back(link(heap_object(objects, fields.take(objects.id_size))));
       if (links.size() > bytes_.size()) damaged(what);
     }
     for (std::size_t i = 0; node.level && i <= node.count; ++i) {
@@ -776,13 +774,14 @@ std::string Image::chunks(const Object& object, std::string_view message, const 
 
   std::uint64_t total = array.width;
   for (const std::uint64_t n : array.shape) total *= n;
-  std::string values(std::size_t(total), '\0');  // chunks that were never written hold zeros
-  std::uint64_t placed = 0;
+  std::string values(std::size_t(total), '\0');
+  std::uint64_t placed = 0, filled = 0;
   const auto place = [&](std::span<const std::uint64_t> first, std::uint64_t address, std::uint64_t stored,
                          std::uint32_t skipped) {
     if (++placed > cells) damaged(what);
     for (std::size_t d = 0; d < rank; ++d)
       if (first[d] >= array.shape[d] || first[d] % extent[d]) return;  // beyond an array that was shortened
+    ++filled;
     std::string chunk(at(address, stored, what));
     if (!unfilter(chunk, filters, skipped, array.width, std::size_t(size))) damaged(what);
     // Rows along the last dimension.
@@ -804,8 +803,15 @@ std::string Image::chunks(const Object& object, std::string_view message, const 
     }
   };
 
+  const auto whole = [&] {
+    if (filled < cells)
+      refuse(fmt::format("lacks {} of {} pieces of an array, which were never written; write the file again",
+                         cells - filled, cells));
+    return std::move(values);
+  };
+
   if (version == 3) {
-    if (index == nowhere) return values;
+    if (index == nowhere) return whole();
     std::vector<std::pair<std::uint64_t, int>> nodes{{index, -1}};
     std::vector<std::uint64_t> first(rank);
     for (std::size_t visited = 0; !nodes.empty(); ++visited) {
@@ -832,7 +838,7 @@ std::string Image::chunks(const Object& object, std::string_view message, const 
       }
       if (nodes.size() > bytes_.size()) damaged(what);
     }
-    return values;
+    return whole();
   }
 
   const std::uint8_t kind = layout.byte();  // of the chunk index
@@ -854,14 +860,14 @@ std::string Image::chunks(const Object& object, std::string_view message, const 
   } else if (kind == 3) {  // a fixed array of addresses
     layout.skip(1);
     const std::uint64_t address = layout.eight();
-    if (address == nowhere) return values;
+    if (address == nowhere) return whole();
     Cursor header(*this, at(address, 28, what), what);
     header.expect("FAHD");
     header.skip(1);
     const bool filtered = header.byte() == 1;
     const std::uint8_t entry = header.byte(), page_bits = header.byte();
     const std::uint64_t count = header.eight(), block = header.eight();
-    if (block == nowhere) return values;
+    if (block == nowhere) return whole();
     if (page_bits < 64 && count > (1ull << page_bits)) unknown();
     Cursor entries(*this, bytes_.substr(std::size_t(std::min<std::uint64_t>(block, bytes_.size()))), what);
     entries.expect("FADB");
@@ -876,7 +882,7 @@ std::string Image::chunks(const Object& object, std::string_view message, const 
   } else {
     unknown();
   }
-  return values;
+  return whole();
 }
 
 }  // namespace forest::io::hdf5

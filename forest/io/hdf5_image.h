@@ -49,6 +49,8 @@ class Image {
     bool is_array() const;
   };
   struct Link {
+    static constexpr std::uint64_t soft =
+        ~0ull;  // the address of one that names another by its path, or another file
     std::string name;
     std::uint64_t address = 0;
   };
@@ -58,7 +60,7 @@ class Image {
 
   std::uint64_t root() const { return root_; }
   Object open(std::uint64_t address) const;
-  std::vector<Link> links(const Object& group) const;  // hard ones, sorted by name
+  std::vector<Link> links(const Object& group) const;  // sorted by name
 
   /// Throws also when it holds anything but numbers.
   Array array(const Object& object, std::string_view path) const;
@@ -88,7 +90,7 @@ class Image {
   AttributeParts parts(const Message& message) const;
   std::optional<Attribute> attribute(const Object& object, std::string_view name) const;
   void symbols(std::string_view message, std::vector<Link>& links) const;
-  std::optional<Link> link(std::string_view message) const;
+  Link link(std::string_view message) const;
   void dense_links(std::string_view message, std::vector<Link>& links) const;
   std::string_view heap_object(const FractalHeap& heap, std::string_view id) const;
   std::string chunks(const Object& object, std::string_view layout, const Array& array) const;

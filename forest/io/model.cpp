@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/core/lower.h"
 #include "forest/io/model_writers.h"
 #include "forest/morphology/surface.h"
 
@@ -74,8 +75,7 @@ const ModelFormat* find_model_format(std::string_view name) {
 }
 
 const ModelFormat* model_format_of(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c;
+  const std::string extension = lower(path.extension().string());
   for (const ModelFormat& format : table)
     if (std::ranges::find(format.extensions, extension) != format.extensions.end()) return &format;
   return nullptr;

@@ -166,7 +166,8 @@ NiftiVolume read_nifti(std::string_view packed, const std::string& name) {
         "should have {:.0f} voxels of {} bytes from byte {:.0f} on and has {} bytes; get the whole file",
         voxels, type->size, offset, bytes.size()));
   // Units: 1 m, 2 mm, 3 µm; 0 is not said, and then mm as all write.
-  const int unit = int(header.number<std::int8_t>(at.units)) & 7;
+  const int unit =
+      int(at.wide ? header.number<std::int32_t>(at.units) : header.number<std::int8_t>(at.units)) & 7;
   const double scale = unit == 1 ? 1e6 : unit == 3 ? 1. : 1e3;
   const Affine affine = affine_of(header, step) * scale;
   if (!affine.allFinite()) header.fail("has a place or a voxel size that is no number; get the file again");

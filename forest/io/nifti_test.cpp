@@ -111,6 +111,11 @@ TEST(Nifti, ScalesItsValuesAndItsUnit) {
   const cortex::Volume volume = read_nifti(file.bytes, "v.nii").volume;
   EXPECT_EQ(volume.at(3, 2, 1), 7.f + .5f * 123.f);
   EXPECT_EQ(volume.step.x(), 1.);
+  for (const bool big : {false, true}) {  // of the second version the unit takes four bytes
+    File wide = small(true, big);
+    wide.put(500, std::int32_t(3));
+    EXPECT_EQ(read_nifti(wide.bytes, "v.nii").volume.step.x(), 1.);
+  }
 }
 
 TEST(Nifti, IsRefusedWhereverItIsCutOff) {

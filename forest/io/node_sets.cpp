@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <set>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/core/json.h"
 
 namespace forest::io {
 namespace {
@@ -27,7 +27,21 @@ constexpr std::array<std::pair<std::string_view, Test>, 5> operators{{{"$regex",
                                                                       {"$gte", Test::at_least},
                                                                       {"$lte", Test::at_most}}};
 
-constexpr int deepest = 8;  // brackets within brackets: node sets have three
+// What was read: objects as they stand in the text, member behind member. check_json() has seen that no key stands twice, so
+// that none need be looked for, which with a hundred thousand sets takes minutes.
+template <class Key, class T, class Less, class Allocator>
+struct Listed : nlohmann::ordered_map<Key, T, Less, Allocator> {
+  using nlohmann::ordered_map<Key, T, Less, Allocator>::ordered_map;
+  T& operator[](const Key& key) {
+    this->emplace_back(key, T{});
+    return this->back().second;
+  }
+};
+using Read = nlohmann::basic_json<Listed>;
+
+constexpr JsonLimits limits{.deepest = 8,  // node sets have three brackets within one another
+                            .most_members = std::size_t(-1),
+                            .keys_once = true};  // one that is used twice would quietly win or lose
 constexpr std::size_t most_bytes = 64
                                    << 20;  // some eight million neurons one by one; a mistake is often larger
 
@@ -40,7 +54,7 @@ struct Place {
   }
 };
 
-void add_value(const Place& place, const std::string& attribute, const Json& value, Clause& clause) {
+void add_value(const Place& place, const std::string& attribute, const Read& value, Clause& clause) {
   if (value.is_string() && attribute != "node_id")
     clause.words.push_back(value.get<std::string>());
   else if (value.is_number() && attribute != "population") {
@@ -59,11 +73,11 @@ void add_value(const Place& place, const std::string& attribute, const Json& val
   }
 }
 
-void add_clauses(const Place& place, const std::string& attribute, const Json& value, NodeSet& set) {
+void add_clauses(const Place& place, const std::string& attribute, const Read& value, NodeSet& set) {
   if (!value.is_object()) {
     Clause clause{.attribute = attribute, .test = Test::any_of, .words = {}, .numbers = {}};
     if (value.is_array())
-      for (const Json& one : value) add_value(place, attribute, one, clause);
+      for (const Read& one : value) add_value(place, attribute, one, clause);
     else
       add_value(place, attribute, value, clause);
     set.clauses.push_back(std::move(clause));
@@ -88,12 +102,12 @@ void add_clauses(const Place& place, const std::string& attribute, const Json& v
   }
 }
 
-NodeSet set_of(const std::string& source, const std::string& name, const Json& rule) {
+NodeSet set_of(const std::string& source, const std::string& name, const Read& rule) {
   NodeSet set{.name = name, .clauses = {}, .of = {}};
   const Place place{source, name};
   if (rule.is_array()) {
     set.compound = true;
-    for (const Json& other : rule) {
+    for (const Read& other : rule) {
       if (!other.is_string())
         throw InputError(source, 0,
                          fmt::format("the node set '{}' must list names of other sets only", name));
@@ -108,35 +122,14 @@ NodeSet set_of(const std::string& source, const std::string& name, const Json& r
   return set;
 }
 
-Json parsed(std::string_view text, const std::string& source) {
+Read parsed(std::string_view text, const std::string& source) {
   if (text.size() > most_bytes)
     throw InputError(
         source, 0,
         fmt::format("has {} MB, and node sets are read up to {}; name a file of node sets, or ask "
                     "for attributes instead of single neurons",
                     text.size() >> 20, most_bytes >> 20));
-  std::set<std::string> names;  // one that is used twice would quietly win or lose
-  std::string twice;
-  bool deep = false;
-  const auto watch = [&](int depth, Json::parse_event_t event, Json& value) {
-    if (event == Json::parse_event_t::key && depth == 1)
-      if (std::string name = value.get<std::string>(); !names.insert(name).second) twice = name;
-    deep |= depth > deepest;
-    return depth <= deepest;
-  };
-  try {
-    Json json = Json::parse(text, watch);
-    if (deep)
-      throw InputError(source, 0,
-                       "has brackets within brackets that node sets do not have; see docs/scene/targets.md");
-    if (!twice.empty())
-      throw InputError(source, 0, fmt::format("has two node sets of the name '{}'; rename one", twice));
-    return json;
-  } catch (const nlohmann::json::parse_error& error) {
-    throw no_json(text, error.byte, source, "correct what stands there or before");
-  } catch (const nlohmann::json::exception&) {
-    throw InputError(source, 0, "is no JSON; correct it as docs/scene/targets.md shows");
-  }
+  return parse_json<Read>(text, source, "correct it as docs/scene/targets.md shows", limits);
 }
 
 Json json_of(const NodeSet& set) {
@@ -164,7 +157,7 @@ Json json_of(const NodeSet& set) {
 }  // namespace
 
 NodeSets parse_node_sets(std::string_view text, const std::string& name) {
-  const Json json = parsed(text, name);
+  const Read json = parsed(text, name);
   if (!json.is_object())
     throw InputError(name, 0,
                      "must be one JSON object with a node set behind each name; see docs/scene/targets.md");

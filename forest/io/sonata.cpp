@@ -5,12 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <numbers>
 
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/core/file.h"
+#include "forest/core/json.h"
 #include "forest/core/parallel.h"
 #include "forest/io/hdf5.h"
 #include "forest/io/new_folder.h"
@@ -36,9 +37,16 @@ void must_take_sonata(const fs::path& folder) {
   if (!fs::exists(folder)) return;
   if (!fs::is_directory(folder)) refuse("is there and is no folder");
   if (fs::is_empty(folder)) return;
-  std::ifstream config(folder / sonata_config_name);
-  if (!SonataConfig::find(Json::parse(config, nullptr, false), sonata_our_key))
-    refuse("holds something other than a circuit of Brain Forest");
+  const auto ours = [&] {
+    try {
+      const fs::path config = folder / sonata_config_name;
+      const auto json = parse_json<Json>(MappedFile(config).text(), config.string(), "");
+      return SonataConfig::find(json, sonata_our_key) != nullptr;
+    } catch (const InputError&) {
+      return false;
+    }
+  };
+  if (!ours()) refuse("holds something other than a circuit of Brain Forest");
 
   constexpr std::array parts{sonata_config_name,      sonata_nodes_name,      sonata_types_name,
                              sonata_edges_name,       sonata_edge_types_name, sonata_outline_name,

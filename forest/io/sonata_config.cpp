@@ -7,23 +7,14 @@
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/core/json.h"
 
 namespace forest::io {
 
 SonataConfig::SonataConfig(const std::filesystem::path& place)
     : file_(std::filesystem::is_directory(place) ? place / sonata_config_name : place) {
-  const MappedFile bytes(file_);
-  const std::string_view text = bytes.text();
-  try {
-    json_ = Json::parse(text);
-  } catch (const Json::parse_error& error) {
-    const auto before = text.substr(0, std::min(text.size(), error.byte ? error.byte - 1 : 0));
-    throw InputError(
-        file_.string(), std::size_t(std::ranges::count(before, '\n')) + 1,
-        "this is not JSON; correct what stands here or before, or name the folder of a SONATA circuit");
-  } catch (const Json::exception&) {
-    throw InputError(file_.string(), 0, "holds a number too large to be read; correct it");
-  }
+  json_ = parse_json<Json>(MappedFile(file_).text(), file_.string(),
+                           "correct it, or name the folder of a SONATA circuit");
   if (!find(json_, "networks"))
     refuse("has no \"networks\"; name the configuration file of a SONATA circuit, or its folder");
   if (const Json* manifest = find(json_, "manifest")) {

@@ -12,6 +12,7 @@
 #include "forest/core/distinct.h"
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/core/json.h"
 #include "forest/core/parallel.h"
 #include "forest/io/hdf5.h"
 #include "forest/io/sonata.h"
@@ -110,8 +111,7 @@ class Assembler {
   }
 
   void read_outline(const fs::path& file) {
-    const MappedFile mapped(file);
-    const Json lines = Json::parse(mapped.text(), nullptr, false);
+    const auto lines = parse_json<Json>(MappedFile(file).text(), file.string(), "plant the circuit again");
     if (!lines.is_array()) throw InputError(file.string(), 0, "is no list of lines; plant the circuit again");
     for (const Json& line : lines) {
       auto& points = circuit_.outline.emplace_back();

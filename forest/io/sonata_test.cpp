@@ -6,6 +6,7 @@
 #include <map>
 #include <numbers>
 #include <sstream>
+#include <tuple>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -21,6 +22,7 @@
 #include "forest/reports/layout.h"
 
 #include "tests/real_data.h"
+#include "tests/refused.h"
 
 namespace forest::io {
 namespace {
@@ -139,7 +141,7 @@ TEST_F(Sonata, TheOutlineOfElementsAndTheWayUpComeBack) {
   for (const auto& [file, from, to, what] :
        {std::tuple{"outline.json", "[0,0,0]", "[0,0]", "a point of the \"outline\" must be three numbers"},
         {"outline.json", "[0,0,0]", "\"word\"", "a point of the \"outline\" must be three numbers"},
-        {"outline.json", "[[[", "{", "is no list of lines"},
+        {"outline.json", "[[[", "{", "is no JSON"},
         {"circuit_config.json", "0.9375", "\"x\"", "\"up\" must be three numbers"},
         {"circuit_config.json", "outline.json", "other.json", "other.json"}}) {
     write();
@@ -338,7 +340,9 @@ TEST_F(Sonata, AWrongConfigurationIsNamed) {
     write_file(folder() / "circuit_config.json", R"({"brainforest": {}})");
     return says;
   };
-  EXPECT_THAT(spoil("\"version\"", "version"), HasSubstr("circuit_config.json:2: this is not JSON"));
+  EXPECT_THAT(spoil("\"version\"", "version"), HasSubstr("circuit_config.json:2: is no JSON"));
+  const std::string deep = "\"deep\": " + std::string(1000, '[') + std::string(1000, ']') + ", \"version\"";
+  EXPECT_THAT(spoil("\"version\"", deep.c_str()), HasSubstr("more than 32 brackets"));
   EXPECT_THAT(spoil("\"networks\"", "\"network\""), HasSubstr("has no \"networks\""));
   EXPECT_THAT(spoil("\".\"", "\"$BASE_DIR\""), HasSubstr("not define"));
   EXPECT_THAT(spoil("\".\"", "\"$BASE_DIR/$BASE_DIR\""), HasSubstr("without end"));
@@ -348,6 +352,36 @@ TEST_F(Sonata, AWrongConfigurationIsNamed) {
   EXPECT_THAT(spoil("\"radius\": 100.0", "\"radius\": \"wide\""), HasSubstr("\"radius\" must be a number"));
   EXPECT_THAT(spoil("\"biophysical\"", "\"virtual\""),
               "accepted");  // and its neurons are left out, with a warning
+}
+
+// Each ended the library with a crash.
+TEST(Hdf5, AnArrayOfAnotherSizeThanItSaysIsRefused) {
+  const fs::path path = fs::temp_directory_path() / ("forest-hdf5-size." + std::to_string(::getpid()));
+  const std::vector<std::uint64_t> wholes(9, 0x1234567890abcdef);
+  {
+    hdf5::NewFile file(path);
+    file.write("/a", std::span(wholes));
+    file.close();
+  }
+  const std::string whole(MappedFile(path).text());
+  // The message that says how the array lies there: version 3, in one piece, where, how many bytes.
+  const std::uint64_t size = 8 * wholes.size();
+  const std::string sizes(reinterpret_cast<const char*>(&size), 8);
+  std::size_t message = 1;
+  do message = whole.find("\3\1", message + 1);
+  while (message != whole.npos && whole.substr(message + 10, 8) != sizes);
+  ASSERT_NE(message, whole.npos);
+  const std::tuple<std::size_t, std::string, const char*> wrong[] = {
+      {1, std::string(3, '\0'), "other bytes are there"},        // within the header, no byte
+      {2, std::string("\0\0\0\1", 4), "other bytes are there"},  // far beyond the end
+      {10, "\x8", "other bytes are there"}};                     // fewer bytes
+  for (const auto& [at, bytes, words] : wrong) {
+    std::string damaged = whole;
+    write_file(path, damaged.replace(message + at, bytes.size(), bytes));
+    EXPECT_THAT(forest::refused<InputError>([&] { hdf5::File(path).integers("/a"); }), HasSubstr(words))
+        << at;
+  }
+  fs::remove(path);
 }
 
 TEST(Hdf5, ArraysComeBackAndOtherKindsAreRefused) {

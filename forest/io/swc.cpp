@@ -42,6 +42,7 @@ constexpr std::array<Oddity, static_cast<std::size_t>(SwcOddity::count)> table{{
     {"zero-radius", true, "kept as 0", "give the measured one"},
     {"unknown-place", true, "read as that of the parent point",
      "look it up in the tracing, or remove the point"},
+    {"precision", true, "read as one place", "move the neuron to the origin, then read it again", true},
     {"first-id", false, "any id may be the first"},
     {"id-order", false, "ids need be neither consecutive nor sorted"},
     {"negative-id", true, "read as an id; a parent of -1 still means none"},

@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -68,6 +70,7 @@ class Scanner {
         p = begin;
         while (!is_line_end(*p)) ++p;
         odd_line({begin, p});
+        place_ = nullptr;
       }
       if (*p == '\r') {
         oddities_.add(SwcOddity::line_ends, line_, "lines end in a carriage return");
@@ -92,6 +95,7 @@ class Scanner {
     skip();
     if (!read_integer(p, type)) return false;
     skip();
+    const char* const place = p;
     if (!read_real(p, point.x, exponent)) return false;
     skip();
     if (!read_real(p, point.y, exponent)) return false;
@@ -104,9 +108,40 @@ class Scanner {
     skip();
     if (!is_line_end(*p)) return false;
     add(id, type, point, parent);
+    look_for_twin(place);
     if (tabs) oddities_.add(SwcOddity::tabs, line_, "columns are separated by tabs");
     if (exponent) oddities_.add(SwcOddity::exponent, line_, "a number has an exponent");
     return true;
+  }
+
+  /// Places that the file tells apart and 32-bit numbers do not, as those far from the origin.
+  /// @param place  where the coordinates of the last row stand
+  void look_for_twin(const char* place) {
+    const char* const before = std::exchange(place_, place);
+    const auto& points = rows_.points;
+    if (!before || points.size() < 2) return;
+    const Point &a = points[points.size() - 2], &b = points.back();
+    if (a.x != b.x || a.y != b.y || a.z != b.z) [[likely]]
+      return;
+    constexpr double least = 1e-3;  // µm; nearer ones are noise of who wrote them
+    double apart = 0.;
+    for (const char *p = before, *q = place; [[maybe_unused]] const int axis : {0, 1, 2})
+      apart = std::max(apart, std::abs(exact(p) - exact(q)));
+    if (apart >= least)
+      oddities_.add(SwcOddity::precision, line_, [&] {
+        return fmt::format(
+            "the point is {:.3g} µm from that of the row before, which 32-bit numbers do not tell apart so "
+            "far from the origin",
+            apart);
+      });
+  }
+  static double exact(const char*& p) {
+    while (is_blank(*p) || *p == '+') ++p;
+    const char* const begin = p;
+    while (!ends_number(*p)) ++p;
+    double value = 0.;
+    std::from_chars(begin, p, value);
+    return value;
   }
 
   void add(std::int64_t id, std::int64_t type, Point point, std::int64_t parent) {
@@ -356,6 +391,7 @@ class Scanner {
   const std::string& name_;
   OddityList<SwcOddity>& oddities_;
   SwcRows rows_;
+  const char* place_ = nullptr;  // where the coordinates of the row before stand, in the text
   std::size_t line_ = 0, lines_before_ = 0, blank_line_ = 0, late_comment_ = 0;
   std::vector<std::pair<std::size_t, std::string>> trailing_;  // lines of words after a row
   bool footer_ = false;

@@ -34,6 +34,7 @@ enum class SwcOddity : std::uint8_t {
   negative_radius,
   zero_radius,
   unknown_place,
+  precision,
   first_id,
   id_order,
   negative_id,

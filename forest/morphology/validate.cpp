@@ -2,6 +2,8 @@
 #include "forest/morphology/validate.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -37,6 +39,12 @@ bool ends_fat(std::span<const Point> points) {
   return double(last.back().radius) > fat_end_factor * sum / double(last.size());
 }
 
+// Where neighbouring 32-bit numbers are more than a nanometre apart.
+bool is_far(const Point& p) {
+  const float most = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+  return std::nextafter(most, std::numeric_limits<float>::infinity()) - most > 1e-3f;
+}
+
 }  // namespace
 
 std::vector<Finding> validate(const Morphology& m) {
@@ -64,7 +72,11 @@ std::vector<Finding> validate(const Morphology& m) {
         add(Severity::warning, "zero-radius", id, at, "the radius is 0; give the measured one");
       if (k == 0) continue;
       const double length = segment_length(points[k - 1], points[k]);
-      if (length == 0.) add(Severity::note, "zero-length", id, at, "two points lie at one place; drop one");
+      if (length == 0.)
+        add(Severity::note, "zero-length", id, at,
+            is_far(points[k]) ? "two points lie at one place, or are nearer than 32-bit numbers tell apart "
+                                "there; move the neuron to the origin"
+                              : "two points lie at one place; drop one");
       if (median > 0. && length > jump_factor * median)
         add(Severity::warning, "jump", id, at,
             fmt::format("a segment of {:.1f} µm among segments of {:.1f} µm; look for a missing part", length,

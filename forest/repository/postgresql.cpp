@@ -11,6 +11,7 @@
 #include <soci/postgresql/soci-postgresql.h>
 
 #include "forest/core/error.h"
+#include "forest/core/lower.h"
 #include "forest/core/number.h"
 #include "forest/repository/database.h"
 #include "forest/repository/insert.h"
@@ -253,9 +254,7 @@ class Postgresql final : public Database {
       const char* text = PQresultErrorField(result.get(), PG_DIAG_MESSAGE_PRIMARY);
       const std::string why = text ? text : "the connection is lost";
       const std::size_t word = std::min(question.find_first_not_of(" \t\r\n("), question.size());
-      std::string first = question.substr(word, question.find_first_of(" \t\r\n(", word) - word);
-      std::ranges::transform(first, first.begin(),
-                             [](char c) { return c >= 'A' && c <= 'Z' ? char(c | 32) : c; });
+      const std::string first = lower(question.substr(word, question.find_first_of(" \t\r\n(", word) - word));
       if (state == "25006" || (state == "42601" && first != "select" && first != "with"))
         throw Error("a question can read and not write; ask with select");
       if (state == "42501") throw Error(not_allowed(false, why));
@@ -354,9 +353,8 @@ class Postgresql final : public Database {
 }  // namespace
 
 bool is_meant_for_a_server(std::string_view place) {
-  std::string text;
-  for (const char c : place)
-    if (c != ' ' && c != '\t' && c != '\r' && c != '\n') text += c >= 'A' && c <= 'Z' ? char(c | 32) : c;
+  std::string text = lower(place);
+  std::erase_if(text, [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; });
   for (const char* word : {"password=", "passwd=", "pwd="})
     if (text.find(word) != text.npos) return true;
   if (text.find('=') != text.npos && options_of(std::string(place))) return true;

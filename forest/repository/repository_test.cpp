@@ -408,6 +408,15 @@ TEST_F(RepositoryTest, TheJournalOfARepositoryThatIsGoneDoesNoHarm) {
   EXPECT_EQ(whole_neurons(file_, source), 1u);
 }
 
+// Two containers may have programs of one number.
+TEST_F(RepositoryTest, ANewOneTouchesNoFileOfAnotherThatIsBeingMade) {
+  const std::string other = fmt::format("{}.new-{}", file_, ::getpid());
+  write_file(other, std::string_view("another program's"));
+  Repository::open(file_, Access::write).add(neuron(1), called("a"));
+  EXPECT_EQ(bytes_of(other), "another program's");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 2);
+}
+
 TEST_F(RepositoryTest, AFullDiskIsASentenceAndLosesNothing) {
   std::vector<Morphology> source;
   for (std::size_t i = 0; i < 60; ++i) source.push_back(neuron(i, 100));
@@ -642,7 +651,7 @@ TEST_F(RepositoryTest, WhatIsNoRepositoryIsRefusedAndNotTouched) {
               HasSubstr("there is no such repository"));
   EXPECT_FALSE(fs::exists(file_ + "x"));
   EXPECT_THAT(message([&] { Repository::open(folder_ / "none" / "x", Access::write); }),
-              HasSubstr("cannot be opened"));
+              HasSubstr("cannot be created"));
 }
 
 TEST_F(RepositoryTest, ReadingAccessDoesNotWrite) {

@@ -116,8 +116,15 @@ struct Condition {
 Condition condition_of(std::string_view text, const std::map<std::string, int, std::less<>>& numbers) {
   Condition condition;
   std::vector<int> joined;
+  // It stands in brackets among others, of which its own may close none.
+  constexpr std::string_view one =
+      "the condition is not one expression; close every bracket that it opens, and leave comments out";
+  std::size_t open = 0;
   for (std::size_t at = 0; at < text.size();) {
     const char c = text[at];
+    const std::string_view two = text.substr(at, 2);
+    if ((c == ')' && open == 0) || two == "--" || two == "/*") throw Error(std::string(one));
+    open += c == '(', open -= c == ')';
     const auto word_char = [](char d) {
       return (d >= 'a' && d <= 'z') || (d >= 'A' && d <= 'Z') || (d >= '0' && d <= '9') || d == '_' || d < 0;
     };
@@ -148,6 +155,7 @@ Condition condition_of(std::string_view text, const std::map<std::string, int, s
       ++at;
     }
   }
+  if (open) throw Error(std::string(one));
   return condition;
 }
 

@@ -16,6 +16,7 @@
 #include <sys/stat.h>
 
 #include "forest/core/error.h"
+#include "forest/core/file.h"
 #include "forest/repository/database.h"
 #include "forest/repository/insert.h"
 #include "forest/repository/names.h"
@@ -32,7 +33,7 @@ struct Sentence {
   const char* text;
 };
 
-constexpr std::array<Sentence, 9> sentences{{
+constexpr std::array<Sentence, 10> sentences{{
     {SQLITE_FULL, "the disk is full and nothing of this was stored; make room and try again"},
     {SQLITE_IOERR, "the disk is full or failing and nothing of this was stored; make room and try again"},
     {SQLITE_BUSY, "another program has been writing to it for over a minute; try again when it is done"},
@@ -43,6 +44,8 @@ constexpr std::array<Sentence, 9> sentences{{
     {SQLITE_PERM, "cannot be opened; check the permissions of the file and its folder"},
     {SQLITE_CANTOPEN, "cannot be opened; check the path and the permissions of the file and its folder"},
     {SQLITE_NOTADB, "is no repository; name another file, or one that does not exist yet"},
+    {SQLITE_TOOBIG,
+     "one text or number of bytes is larger than a database holds, 1 GB; ask for less at once"},
     {SQLITE_CORRUPT, "is damaged or cut off; restore it from a backup, or make it again from its sources"},
 }};
 
@@ -367,11 +370,8 @@ int name_file(const std::string& part, const std::string& path) {
 /// Makes a repository without neurons at `path`. It is filled under another name and then linked into place,
 /// so that a killed program leaves no half of it and the first of two programs wins.
 void create(const std::string& path) {
-  const std::string part = fmt::format("{}.new-{}", path, ::getpid());
-  const auto clean = [&] {
-    for (const char* end : {"", "-journal"}) ::unlink((part + end).c_str());
-  };
-  clean();
+  NewFile file(path);  // which has a name that no other program has, and is gone under it in the end
+  const std::string part = file.path().string();
   try {
     Sqlite database;
     database.open(part, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
@@ -391,10 +391,9 @@ void create(const std::string& path) {
     if (!failed) ::unlink((path + "-journal").c_str());
     sql << "rollback";
   } catch (...) {
-    clean();
+    ::unlink((part + "-journal").c_str());
     throw;
   }
-  clean();
 }
 
 [[noreturn]] void refuse_newer(const std::string& place, int version) {
@@ -456,6 +455,7 @@ std::unique_ptr<Database> connect_sqlite(const std::string& place, bool write, R
       create(path);
       status = fs::status(path, error);
     }
+    if (status.type() == fs::file_type::none) throw fs::filesystem_error("status", place, error);
     if (status.type() != fs::file_type::regular)
       throw InputError(place, 0,
                        "is not a regular file that can be read; name a file, not a folder or device");

@@ -8,7 +8,6 @@
 #include <functional>
 #include <limits>
 #include <numbers>
-#include <set>
 #include <string>
 #include <utility>
 
@@ -18,6 +17,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/half.h"
+#include "forest/core/json.h"
 #include "forest/scene/gallery.h"
 #include "forest/scene/placed.h"
 
@@ -613,19 +613,8 @@ Mat3 standing(const Forest& forest) {
 }
 
 View parse_view(std::string_view text, const std::string& name, const Vec3& up, const View* whole) {
-  Json json;
-  try {
-    std::vector<std::set<std::string>> open;  // objects, with the keys that each has had
-    json = Json::parse(text, [&](int, Json::parse_event_t event, Json& value) {
-      if (event == Json::parse_event_t::object_start) open.emplace_back();
-      if (event == Json::parse_event_t::object_end) open.pop_back();
-      if (event == Json::parse_event_t::key && !open.back().insert(value.get<std::string>()).second)
-        throw InputError(name, 0, fmt::format("has '{}' twice; take one out", value.get<std::string>()));
-      return true;
-    });
-  } catch (const nlohmann::json::exception& e) {
-    throw InputError(name, 0, fmt::format("is no view: {}; see docs/scene/view.md", e.what()));
-  }
+  const auto json = parse_json<Json>(
+      text, name, "correct what stands there or before, as docs/scene/view.md shows", {.keys_once = true});
   if (!json.is_object())
     throw InputError(name, 0, "a view is a JSON object with 'eye' and 'target'; see docs/scene/view.md");
   const bool stands = !whole || json.contains("eye") || json.contains("target");

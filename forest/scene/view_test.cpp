@@ -100,6 +100,7 @@ TEST(View, SaysWhichKeyIsWrong) {
   };
   EXPECT_NE(error_of("{").find("v.json"), std::string::npos);
   EXPECT_NE(error_of("[]").find("object"), std::string::npos);
+  EXPECT_NE(error_of((R"({"eye":)" + std::string(100'000, '[')).c_str()).find("brackets"), std::string::npos);
   EXPECT_NE(error_of(R"({"eye":[0,0,1]})").find("target"), std::string::npos);
   EXPECT_NE(error_of(R"({"eye":[0,0],"target":[0,0,0]})").find("eye"), std::string::npos);
   EXPECT_NE(error_of(R"({"eye":[0,0,1],"target":[0,0,1]})").find("same point"), std::string::npos);

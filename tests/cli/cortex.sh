@@ -257,7 +257,7 @@ done
 refuses 'unit is of an .slc file' $BRAINFOREST cortex surfaces s.contours --unit 2 -o no.gii no2.gii
 refuses 'coarser than the sections, which are 1 mm apart' $BRAINFOREST cortex surfaces s.contours --voxel 3 -o no.gii no2.gii
 sed '3s/"at": [-0-9.]*,/"at": 1e400,/' s.contours >large.contours
-refuses 'large.contours: holds a number too large' $BRAINFOREST cortex compare large.contours
+refuses 'large.contours:3: holds a number too large' $BRAINFOREST cortex compare large.contours
 /usr/bin/python3 - <<'PY'
 import json
 d = json.load(open("s.contours"))

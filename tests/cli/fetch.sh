@@ -134,7 +134,7 @@ fails_with 1 '3 of 4 cells' fetch --query species:hostile --out hostile
 [ "$(find . -name '*escaped*')" = '' ] && [ ! -e ../../escaped.swc ] && [ "$(ls hostile | wc -l)" = 2 ]
 fails_with 1 'pages ended early' fetch --query species:broken --limit 200 --out broken --retries 0
 [ "$(ls broken/*.swc | wc -l)" = 5 ]
-fails_with 1 'not JSON' fetch --query species:broken --limit 200 --out broken --retries 0
+fails_with 1 'is no JSON' fetch --query species:broken --limit 200 --out broken --retries 0
 
 # Killed in the middle: the same command continues where it was.
 /usr/bin/python3 - <<'PY'

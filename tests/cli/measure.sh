@@ -109,6 +109,10 @@ fails_with 2 'groups are of neurons' $BRAINFOREST measure --repo types.db --by t
 
 # What a repository keeps is found by it; what it does not keep is measured.
 [ "$($BRAINFOREST list --repo types.db --where 'max_strahler_order = 2 and total_length > 45' | grep -c longest)" = 1 ]
+for condition in '1) or (1' '1 /* ( */) or (1 /* ) */' '(1'; do
+  fails_with 1 'is not one expression' $BRAINFOREST list --repo types.db --where "$condition"
+done
+$BRAINFOREST list --repo types.db --where "(name <> ')(') and length > 0" >/dev/null
 fails_with 1 'tmd_path_births' $BRAINFOREST list --repo types.db --where 'tmd_path_births > 1'
 $BRAINFOREST measure --repo types.db --metric tmd_path_births,total_length --store >/dev/null
 [ "$($BRAINFOREST list --repo types.db --where 'tmd_path_births > 25' | grep -c longest)" = 1 ]

@@ -144,7 +144,7 @@ PY
   short 1 "there is no model 'shrub'; those that are there: bush, motoneuron, pyramidal" $model remove bush shrub --repo "$repo"
   short 1 "model 'bush' has no version 9" $model remove bush@9 --repo "$repo"
   short 1 "'bush@2' is one version" $model remove bush@2 --all --repo "$repo"
-  short 1 "there is no model ''" $model remove '' --repo "$repo"
+  short 2 'what is given is empty' $model remove '' --repo "$repo"
   short 2 '--repo' $model remove bush
   short 2 'names' $model remove --repo "$repo"
   [ "$($model list --repo "$repo" --all --json | json '[m["version"] for m in d if m["name"] == "bush"]')" = '[1, 2, 3, 4, 5]' ]

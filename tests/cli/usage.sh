@@ -29,6 +29,16 @@ fails_with 2 "'foo' is none of auto, cpu, opengl" $program render x.forest -o x.
 fails_with 2 "'blue' is none of sign, target" $program render x.forest -o x.png --synapse-colour blue
 fails_with 2 "'nan' is no number from 0 to 1" $program render x.forest -o x.png --gaze nan .5
 fails_with 2 'what is given is empty; give a value, or leave the option out' $program render x.forest -o x.png --view ''
+for command in 'import' 'check' 'convert' 'convert --format swc --out x'; do
+  fails_with 2 'what is given is empty' $program $command ''
+done
+fails_with 2 "'nan' is no number from 0.001 to 1000" $program fetch --query x:y --out x --rate nan
+fails_with 2 "'nan' is no number from 1 to 3600" $program fetch --query x:y --out x --timeout nan
+fails_with 2 "'nan' is no number from 0 to 1000" $program convert a.swc b.ply --detail nan
+fails_with 2 "'nan' is no number from" $program raster x.activity -o x.png --to nan
+long=$(printf 'a%.0s' {1..300})
+fails_with 1 'File name too long; check the path, and who may read and write there' $program list --repo $long
+fails_with 1 'File name too long; check the path, and who may read and write there' $program import x.swc --repo $long
 fails_with 2 'what is given is empty; give a value, or leave the option out' $program cortex surfaces x.svg --out ''
 for benchmark in activity pick targets; do
   $program bench $benchmark --help | grep -q "brainforest bench $benchmark --neurons"
@@ -47,6 +57,11 @@ fails_with 1 '1 of 2' $program check good.swc missing.swc
 fails_with 1 'missing.swc' $program measure good.swc missing.swc
 fails_with 1 'missing.swc' $program convert good.swc missing.swc --format swc --out converted
 cmp <($program measure good.swc --json) <($program measure converted/good.swc --json | sed 's/converted\///')
+# What cannot be said on standard error is lost, and nothing else.
+printf '1 1 0 0 0 5 -1\n2 3 0 5 0 0 1\n3 3 0 9 0 0 2\n' >thin.swc
+$program import thin.swc missing.swc --repo full.db >/dev/null 2>/dev/full && exit 1 || [ $? = 1 ]
+$program import thin.swc missing.swc --repo closed.db >/dev/null 2>&- && exit 1 || [ $? = 1 ]
+for repo in full closed; do $program list --repo $repo.db | grep -q thin; done
 mkdir folder && cp good.swc folder/ && touch folder/notes.txt folder/.hidden
 for verb in import check measure convert; do
   more=()
