@@ -155,13 +155,12 @@ View view_of_gallery(const Forest& forest, float aspect, std::span<const frame::
   const Vec3 extent = box.extent();
   view.camera.projection = frame::Projection::orthographic;
   const float half = .5f * std::max({extent.y(), extent.x() / aspect, 1.f}) / filled;
-  const float away = half / std::tan(.5f * radians(view.camera.field_of_view));
-  // As far before it as the field of view says, and before all of it.
+  // As far before it as the field of view says, but before all of it, and where depth is still told (frame/layout.h).
+  constexpr float farthest = 2e5f;
+  const float usual = half / std::tan(.5f * radians(view.camera.field_of_view)),
+              away = std::max(std::min(usual, farthest), .5f * extent.z() + 2.f);
+  if (away != usual) view.camera.field_of_view = 2.f * degrees(std::atan(half / away));
   view.camera.target = box.centre(), view.camera.eye = box.centre() + Vec3(0.f, 0.f, away);
-  if (const float before = .5f * extent.z() + 2.f; before > away) {
-    view.camera.field_of_view = 2.f * degrees(std::atan(half / before));
-    view.camera.eye.z() = box.centre().z() + before;
-  }
   return view;
 }
 
