@@ -42,9 +42,11 @@ const frame::Image& Foveated::draw(const scene::View& view, std::uint32_t width,
   for (const frame::Overlay& overlay : overlays)
     (plan.size() > 1 && overlay.colour == scene::outline_entry ? outlines : others).push_back(overlay);
   std::vector<frame::Frame> frames;
+  scene::View whole = view;  // branches are as wide in all layers
+  if (!view.least_width) whole.least_width = scene::least_width_of(forest_, view.camera, width, height);
   for (std::size_t i = 0; i < plan.size(); ++i) {
     const scene::Layer& layer = plan[i];
-    const scene::View shown = scene::view_for(view, layer);
+    const scene::View shown = scene::view_for(whole, layer);
     frame::Frame& frame = frames.emplace_back(
         scene::compose(forest_, shown, colouring, choosers[i]->cut(), layer.width, layer.height,
                        i == 0 ? overlays : std::span<const frame::Overlay>(others)));

@@ -270,6 +270,7 @@ View view_for(const View& view, const Layer& layer) {
   View shown = view;
   if (layer.scale <= 1.f) return shown;
   shown.halo /= layer.scale;
+  if (shown.least_width) *shown.least_width /= layer.scale;
   shown.detail.thinnest = thinnest_in(view, layer);
   if (shown.samples == 1 && layer.scale > view.detail.pixel) shown.samples = coarse_samples;
   return shown;

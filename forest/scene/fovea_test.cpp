@@ -192,12 +192,13 @@ TEST_P(UnitedLayers, AreTheFinestInTheFoveaAndShowTheSameElsewhere) {
 
 TEST(Layers, WithLargerPixelsHaveWeakerRimsAndMoreThanOneSample) {
   View view = view_with_gaze({.5f, .5f});
-  view.halo = .8f;
+  view.halo = .8f, view.least_width = 1.2f;
   for (const std::uint32_t samples : {1u, 16u}) {
     view.samples = samples;
     for (const Layer& layer : layers_of(view, width, height)) {
       const View shown = view_for(view, layer);
       EXPECT_NEAR(shown.halo * layer.scale, .8f, 1e-5f);
+      EXPECT_NEAR(*shown.least_width * layer.scale, 1.2f, 1e-5f);
       EXPECT_EQ(shown.samples, samples > 1 ? samples : layer.scale > 1.f ? 4u : 1u);
       // As many branches, however many samples; in coarse layers fewer, and none so thin that it falls between the samples.
       if (layer.scale > 1.f)
