@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/round_numbers.h"
+#include "forest/core/shortened.h"
 #include "forest/statistics/summary.h"
 #include "forest/statistics/two_samples.h"
 

@@ -19,8 +19,6 @@ std::string in_thousands(std::string number) {
   return number;
 }
 
-bool begins(char c) { return (c & 0xc0) != 0x80; }  // a character of UTF-8
-
 }  // namespace
 
 std::string readable(double value) {
@@ -41,22 +39,6 @@ std::string readable_mark(double value, double step) {
   if (std::abs(value) >= many || step < few) return fmt::format("{:.3g}", value);
   const int digits = std::max(0, int(std::ceil(-std::log10(step) - 1e-9)));
   return in_thousands(fmt::format("{:.{}f}", value, digits));
-}
-
-std::size_t characters(std::string_view text) { return std::size_t(std::ranges::count_if(text, begins)); }
-
-std::string shortened(std::string_view text, std::size_t most) {
-  const std::size_t all = characters(text);
-  if (all <= most) return std::string(text);
-  const std::size_t kept = std::max<std::size_t>(most, 3) - 1, head = kept - kept / 2, tail = kept / 2;
-  std::string out;
-  std::size_t at = 0;  // of characters
-  for (const char c : text) {
-    at += begins(c);
-    if (at == head + 1 && begins(c)) out += "…";
-    if (at <= head || at > all - tail) out += c;
-  }
-  return out;
 }
 
 }  // namespace forest::cli

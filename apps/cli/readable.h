@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers and names as people read them, in the tables, sentences and reports on populations.
+// Numbers as people read them, in the tables, sentences and reports on populations.
 #pragma once
 
-#include <cstddef>
 #include <string>
-#include <string_view>
 
 namespace forest::cli {
 
@@ -15,10 +13,5 @@ std::string readable(double value);
 std::string readable_range(double low, double high);
 /// A number of an axis whose numbers are `step` apart: as many digits behind the point as the step has.
 std::string readable_mark(double value, double step);
-
-/// How many characters of UTF-8.
-std::size_t characters(std::string_view text);
-/// At most `most` characters: the middle makes room for an ellipsis, since names begin and end with what tells them apart.
-std::string shortened(std::string_view text, std::size_t most);
 
 }  // namespace forest::cli

@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
+
+#include "forest/core/shortened.h"
 
 namespace forest::scene {
 namespace {
@@ -255,17 +258,11 @@ float Lettering::width(std::string_view text) const {
 
 std::string Lettering::shortened(std::string text, float room) const {
   if (width(text) <= room) return text;
-  std::vector<std::string_view> signs;
-  for (std::string_view rest = text; !rest.empty();) signs.push_back(next(rest));
-  std::string out;
-  for (std::size_t kept = signs.size(); kept-- > 0;) {
-    const std::size_t front = (kept + 1) / 2;
-    out.clear();
-    for (std::size_t i = 0; i < front; ++i) out += signs[i];
-    out += "…";
-    for (std::size_t i = signs.size() - (kept - front); i < signs.size(); ++i) out += signs[i];
-    if (width(out) <= room) break;
-  }
+  constexpr std::size_t least = 3;
+  std::size_t most = characters(text);
+  std::string out = std::move(text);
+  for (const std::string whole = out; most > least && width(out) > room;)
+    out = forest::shortened(whole, --most);
   return out;
 }
 
