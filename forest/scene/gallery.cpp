@@ -77,6 +77,16 @@ Bounds box_of(const Forest& forest, std::span<const frame::State> states) {
   return all;
 }
 
+// Without an ending that all have, as ".CNG": it takes the room of what tells them apart.
+std::vector<std::string> without_common_ending(std::vector<std::string> names) {
+  const std::string ending = names[0].substr(std::min(names[0].rfind('.'), names[0].size()));
+  const bool common = std::ranges::all_of(
+      names, [&](const std::string& name) { return name.size() > ending.size() && name.ends_with(ending); });
+  for (std::string& name : names)
+    if (common) name.resize(name.size() - ending.size());
+  return names;
+}
+
 View view_without_place() {
   View view;
   view.colour_by = ColourBy::kind;
@@ -196,6 +206,7 @@ void paint_names(frame::Image& image, const Forest& forest, const View& view) {
   const Vec3 middle = boxes.front().empty() ? Vec3(Vec3::Zero()) : boxes.front().centre();
   const float slot = least_slot * widths / float(boxes.size()) /
                      view.camera.pixel_size(viewport.height, (middle - view.camera.eye).norm());
+  const std::vector<std::string> names = without_common_ending(forest.circuit().morphologies);
   for (std::size_t i = 0; i < boxes.size(); ++i) {
     const Bounds& box = boxes[i];
     if (box.empty()) continue;
@@ -203,7 +214,7 @@ void paint_names(frame::Image& image, const Forest& forest, const View& view) {
     const Vec3 left = project(view.camera, viewport, {box.low.x(), box.low.y(), centre.z()}),
                right = project(view.camera, viewport, {box.high.x(), box.low.y(), centre.z()});
     if (!(left.z() > 0.f) || !(right.z() > 0.f)) continue;
-    const std::string& name = forest.circuit().morphologies[forest.instances()[i].morphology];
+    const std::string& name = names[forest.instances()[i].morphology];
     const float most = std::max((right.x() - left.x()) * (1.f + .5f * gap), slot);
     const std::string text = writing.letters.shortened(name, most);
     writing.letters.write(image, text, .5f * (left.x() + right.x() - writing.letters.width(text)),
