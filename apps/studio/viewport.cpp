@@ -98,6 +98,8 @@ void Viewport::change(const Settings& settings) {
                         settings.view.background != old.background || settings.view.targets != old.targets;
   if (recolour) colouring_ = scene::colour(targets_, settings.view);
   settings_ = settings;
+  if (playback_ && settings_.view.activity)
+    settings_.view.activity = playback_->fitted(*settings_.view.activity);
   touch();
   Q_EMIT changed();
   if (recolour) Q_EMIT recoloured();
@@ -198,6 +200,7 @@ void Viewport::play(scene::Playback playback) {
   if (playback_ || !settings_.view.activity) settings_.view.activity = playback.view();
   playback_.emplace(std::move(playback));
   playing_ = false;
+  settings_.view.activity = playback_->fitted(*settings_.view.activity);
   set_time(settings_.view.activity->time.value_or(playback_->begin()));
   Q_EMIT opened();
   Q_EMIT changed();
@@ -329,8 +332,11 @@ void Viewport::resizeGL(int, int) { touch(); }
 
 void Viewport::advance(float seconds) {
   if (playing_) {
-    const double step = double(rate_ * seconds), next = time() + step;
-    set_time(next > playback_->end() ? playback_->begin() : next);  // and again
+    const double step = double(rate_ * seconds), begin = playback_->begin(),
+                 length = playback_->end() - begin, next = time() + step;
+    set_time(next <= playback_->end() ? next
+             : step < length          ? begin  // and again
+                                      : begin + std::fmod(next - begin, std::max(length, step / 1e6)));
     window_ = step;
   }
   if (glide_) {

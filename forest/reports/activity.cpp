@@ -427,24 +427,56 @@ void Activity::gather(std::span<const Wanted> wanted, std::size_t time_level, st
   });
 }
 
-void Activity::greatest(Level level, std::uint64_t begin, std::uint64_t end, std::uint64_t first,
-                        std::span<Code> out) const {
-  if (begin >= end || end > data_->facts.steps)
-    throw Error(fmt::format("{}: steps {} to {} are asked for and not in the file", data_->name, begin, end));
-  std::ranges::fill(out, no_value);
-  std::vector<Code> row(out.size());
+namespace {
+
+// Calls visit(time level, row) for the coarsest rows that make up steps [begin, end).
+template <class Visit>
+void cover(std::uint64_t steps, std::uint64_t begin, std::uint64_t end, Visit&& visit) {
   for (std::uint64_t at = begin; at < end;) {
     std::size_t k = time_level_count - 1;
-    const auto fits = [&](std::size_t level_of_time) {
-      const std::uint64_t factor = 1ull << (2 * level_of_time);
+    const auto fits = [&](std::size_t level) {
+      const std::uint64_t factor = 1ull << (2 * level);
       // The last row of a level is shorter where the steps end.
-      return at % factor == 0 && std::min(at + factor, data_->facts.steps) <= end;
+      return at % factor == 0 && std::min(at + factor, steps) <= end;
     };
     while (!fits(k)) --k;
-    values(level, k, at >> (2 * k), first, row);
-    raise(out, row);
+    visit(k, at >> (2 * k));
     at += 1ull << (2 * k);
   }
+}
+
+}  // namespace
+
+void Activity::expect_steps(std::uint64_t begin, std::uint64_t end) const {
+  if (begin >= end || end > data_->facts.steps)
+    throw Error(fmt::format("{}: steps {} to {} are asked for and not in the file", data_->name, begin, end));
+}
+
+void Activity::greatest(Level level, std::uint64_t begin, std::uint64_t end, std::uint64_t first,
+                        std::span<Code> out) const {
+  expect_steps(begin, end);
+  std::ranges::fill(out, no_value);
+  std::vector<Code> row(out.size());
+  cover(data_->facts.steps, begin, end, [&](std::size_t k, std::uint64_t at) {
+    values(level, k, at, first, row);
+    raise(out, row);
+  });
+}
+
+void Activity::greatest(std::span<const Wanted> wanted, std::uint64_t begin, std::uint64_t end,
+                        std::span<Code> out) const {
+  expect_steps(begin, end);
+  std::vector<Code> row;
+  cover(data_->facts.steps, begin, end, [&](std::size_t k, std::uint64_t at) {
+    if (row.empty()) {  // the first, and most often the only one
+      gather(wanted, k, at, out);
+      row.resize(std::max<std::size_t>(1, out.size()));
+    } else {
+      const std::span<Code> more = std::span(row).first(out.size());
+      gather(wanted, k, at, more);
+      raise(out, more);
+    }
+  });
 }
 
 std::vector<Code> Activity::history(Level level, std::uint64_t value) const {

@@ -133,7 +133,10 @@ class Activity {
   /// row of one time level. Only rows of tiles in which one of them lies are touched. `out` must be as long.
   void gather(std::span<const Wanted> wanted, std::size_t time_level, std::uint64_t row,
               std::span<Code> out) const;
-  /// The greatest over steps [begin, end), from the coarsest rows that lie within. For scrubbing.
+  /// The greatest over steps [begin, end), from the coarsest rows that lie within: for pictures that stand for many.
+  void greatest(std::span<const Wanted> wanted, std::uint64_t begin, std::uint64_t end,
+                std::span<Code> out) const;
+  /// … of values [first, first + out.size()) of a level.
   void greatest(Level level, std::uint64_t begin, std::uint64_t end, std::uint64_t first,
                 std::span<Code> out) const;
 
@@ -162,6 +165,7 @@ class Activity {
  private:
   struct Data;
   explicit Activity(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
+  void expect_steps(std::uint64_t begin, std::uint64_t end) const;
   static Activity check(std::shared_ptr<Data> data, std::span<const std::byte> bytes,
                         const std::string& name);
   std::shared_ptr<const Data> data_;

@@ -184,6 +184,12 @@ ActivityView Playback::view() const {
   return view;
 }
 
+ActivityView Playback::fitted(ActivityView view) const {
+  if (view.time) view.time = std::clamp(*view.time, begin(), end());
+  if (view.neuron && *view.neuron >= shown_.size()) view.neuron.reset();
+  return view;
+}
+
 std::uint64_t Playback::step_at(double time) const {
   const reports::Facts& facts = activity_.facts();
   const double at = std::floor((time - facts.start) / facts.step + 1e-6);
@@ -227,7 +233,7 @@ void Playback::colour(Cut& cut, const Eye& eye, const ActivityView& view, const 
         }
       });
     }
-  read(eye, options, step_at(time));
+  read(eye, options, time);
   find_spikes(time, view, options);
   for (const std::uint32_t i : in_sight_) counted_[i] = true;
   figures_.gather += milliseconds_since(start);
@@ -256,7 +262,7 @@ void Playback::colour(Cut& cut, const Eye& eye, const ActivityView& view, const 
 
 // Reads the values of what is in sight, each neuron's in its level: a matter of the eye and the neuron alone, so that what
 // hides parts of it changes no colour.
-void Playback::read(const Eye& eye, const PlaybackOptions& options, std::uint64_t step) {
+void Playback::read(const Eye& eye, const PlaybackOptions& options, double time) {
   wanted_.clear();
   std::uint64_t values = 0;
   const auto want = [&](std::uint32_t row, Level level) {
@@ -277,13 +283,11 @@ void Playback::read(const Eye& eye, const PlaybackOptions& options, std::uint64_
     if (s.level == Level::neuron) want(row, Level::soma);
     figures_.neurons += !counted_[i];
   }
-  std::size_t time_level = 0;
-  for (double span = activity_.facts().step * double(reports::time_factor);
-       time_level + 1 < reports::time_level_count && span <= options.window;
-       span *= double(reports::time_factor))
-    ++time_level, step /= reports::time_factor;
+  // All steps since the picture before.
+  const std::uint64_t last = step_at(time), before = step_at(time - options.window);
+  const std::uint64_t first = time - options.window < begin() ? 0 : std::min(before + 1, last);
   codes_.resize(values);
-  activity_.gather(wanted_, time_level, step, codes_);
+  activity_.greatest(wanted_, options.window > 0. ? first : last, last + 1, codes_);
   figures_.values += values;
 }
 

@@ -31,6 +31,8 @@ class Playback {
   static Playback open(const Forest& forest, const std::filesystem::path& path);
 
   const reports::Activity& activity() const { return activity_; }
+  /// `view` with a time of the simulation, and no neuron stands out that is not there.
+  ActivityView fitted(ActivityView view) const;
   /// What is shown when nobody chooses: −80 to 20 mV, or the whole range of another unit.
   ActivityView view() const;
   double begin() const { return activity_.facts().start; }  // ms, of the first step and of the last
@@ -97,7 +99,7 @@ class Playback {
     std::uint32_t spikes = 0, spikes_end = 0;  // in spikes_
   };
 
-  void read(const Eye& eye, const PlaybackOptions& options, std::uint64_t step);
+  void read(const Eye& eye, const PlaybackOptions& options, double time);
   void find_spikes(double time, const ActivityView& view, const PlaybackOptions& options);
   /// Segments [first, first + count) of a neuron.
   void paint(std::uint32_t instance, std::uint32_t first_segment, std::uint32_t count,

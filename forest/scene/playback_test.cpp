@@ -551,6 +551,36 @@ TEST(Playback, APictureOfALongWhileShowsTheGreatest) {
   EXPECT_NE(greatest, at_once);
 }
 
+TEST(Playback, PicturesOneAfterTheOtherMissNoStepAndShowNoneThatIsToCome) {
+  const Sample sample;
+  const Activity activity = sample.activity();
+  Playback playback(sample.forest, activity);
+  const Eye eye = eye_at(overview(sample.forest).camera, 1.f);
+  const Cut cut = choose(sample.forest, eye);
+  const auto shown = [&](double time, double window) {
+    Cut now = cut;
+    ActivityView view = playback.view();
+    view.time = time, view.speed = 0.f;
+    playback.colour(now, eye, view, {.window = window, .pixels = 0.f});
+    return all_entries(now);
+  };
+  const double step = activity.facts().step;
+  for (const double steps : {1., 1.4, 3., 7., 21., 70.}) {
+    std::uint64_t next = 0;  // the first step that no picture has shown
+    for (double time = playback.begin() + .3 * step; time <= playback.end(); time += steps * step) {
+      const auto picture = shown(time, steps * step);
+      std::vector<std::uint32_t> greatest(picture.size(), no_value_entry);
+      for (; next <= playback.step_at(time); ++next) {
+        const auto one = shown(activity.facts().time(next), 0.);
+        for (std::size_t i = 0; i < one.size(); ++i)
+          if (one[i] != no_value_entry)
+            greatest[i] = greatest[i] == no_value_entry ? one[i] : std::max(greatest[i], one[i]);
+      }
+      ASSERT_EQ(picture, greatest) << steps << " steps, " << time << " ms";
+    }
+  }
+}
+
 TEST(Playback, ASimulationOfAnotherCircuitIsRefusedAndTheMismatchNamed) {
   const Sample sample;
   const Activity activity = sample.activity();
