@@ -317,6 +317,29 @@ TEST(Cut, GazeDrawsLess) {
   EXPECT_LT(gazed.segments, whole.segments);
 }
 
+TEST(CameraPath, TurnsAndZoomsOnTheSpotAsSlowlyAsItGoes) {
+  std::vector<View> keys(4);
+  for (View& v : keys) v.camera.eye = Vec3::Zero();
+  keys[0].camera.target = Vec3(0.f, 0.f, -500.f);
+  keys[1].camera.target = Vec3(500.f, 0.f, 0.f);  // a quarter turn, then a zoom, then a step
+  keys[2].camera = keys[1].camera, keys[2].camera.field_of_view = 10.f;
+  keys[3].camera = keys[2].camera, keys[3].camera.eye.x() = 400.f, keys[3].camera.target.x() = 900.f;
+  const CameraPath path(keys);
+  constexpr int pictures = 240;
+  float turn = 0.f, zoom = 0.f, move = 0.f;  // most from one picture to the next
+  for (int i = 0; i + 1 < pictures; ++i) {
+    const frame::Camera a = path.at(float(i) / (pictures - 1)).camera,
+                        b = path.at(float(i + 1) / (pictures - 1)).camera;
+    turn = std::max(turn, float(Quat(a.axes()).angularDistance(Quat(b.axes()))));
+    zoom = std::max(zoom, std::abs(std::log(b.field_of_view / a.field_of_view)));
+    move = std::max(move, (b.eye - a.eye).norm());
+  }
+  EXPECT_LT(turn, .08f);
+  EXPECT_LT(zoom, .08f);
+  EXPECT_LT(move, 25.f);
+  EXPECT_NEAR(path.at(1.f).camera.field_of_view, 10.f, 1e-3f);
+}
+
 TEST(CameraPath, GoesThroughItsEndsSmoothlyAndNeverThroughASoma) {
   const Forest forest = sample();
   const CameraPath path = walk(forest);

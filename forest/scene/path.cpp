@@ -36,6 +36,14 @@ Vec3 barry_goldman(const Vec3 p[4], const float k[4], float t) {
   return mix(b1, b2, k[1], k[2]);
 }
 
+// How far what is looked at goes, µm: as the eye moves, or turns or zooms where it is.
+float way(const frame::Camera& from, const frame::Camera& to) {
+  const float reach = std::min((from.target - from.eye).norm(), (to.target - to.eye).norm());
+  const float turn = float(Quat(from.axes()).angularDistance(Quat(to.axes())));
+  const float zoom = std::abs(std::log(to.field_of_view / from.field_of_view));
+  return std::max({(to.eye - from.eye).norm(), reach * turn, reach * zoom});
+}
+
 }  // namespace
 
 CameraPath::CameraPath(std::vector<View> keys) : keys_(std::move(keys)) {
@@ -43,8 +51,7 @@ CameraPath::CameraPath(std::vector<View> keys) : keys_(std::move(keys)) {
   knots_.push_back(0.f);
   for (std::size_t i = 1; i < keys_.size(); ++i) {
     // By the square root of the way: near keys get more time than their distance asks for.
-    const float step = std::sqrt((keys_[i].camera.eye - keys_[i - 1].camera.eye).norm());
-    knots_.push_back(knots_.back() + std::max(step, 1e-3f));
+    knots_.push_back(knots_.back() + std::max(std::sqrt(way(keys_[i - 1].camera, keys_[i].camera)), 1e-3f));
   }
   for (float& k : knots_) k /= std::max(knots_.back(), 1e-6f);
 }
@@ -84,7 +91,8 @@ View CameraPath::at(float t) const {
                            ? a.camera.target
                            : Vec3(view.camera.eye - reach * axes.col(2));
   view.camera.up = axes.col(1);
-  view.camera.field_of_view = mix(a.camera.field_of_view, b.camera.field_of_view);
+  view.camera.field_of_view =
+      std::exp(mix(std::log(a.camera.field_of_view), std::log(b.camera.field_of_view)));
   if (a.plane && b.plane) {
     view.plane->at = a.plane->at + s * (b.plane->at - a.plane->at);
     const Vec3 normal =

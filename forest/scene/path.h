@@ -8,7 +8,8 @@
 
 namespace forest::scene {
 
-/// A curve through views (centripetal Catmull–Rom for the eye, the direction of view turned evenly).
+/// A curve through views (centripetal Catmull–Rom for the eye, the direction of view turned evenly). Turns and zooms on the spot
+/// take as long as if the eye went as far as what it looks at seems to.
 class CameraPath {
  public:
   /// At least one view; throws Error otherwise.
