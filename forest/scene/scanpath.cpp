@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -53,7 +54,9 @@ double Scanpath::duration() const { return samples_.back().time - samples_.front
 
 Scanpath parse_scanpath(std::string_view text, const std::string& name) {
   std::vector<Fixation> samples;
-  std::optional<Vec2> size;  // of the recorded picture, pixels
+  std::optional<double> closed;  // since when the eyes were, before the first sample
+  double last = -std::numeric_limits<double>::infinity();  // the time of the line before
+  std::optional<Vec2> size;                                // of the recorded picture, pixels
   bool pixels = false, begun = false;
   std::size_t line_number = 0;
   if (constexpr std::string_view mark = "\xef\xbb\xbf"; text.starts_with(mark))
@@ -91,10 +94,14 @@ Scanpath parse_scanpath(std::string_view text, const std::string& name) {
     if (cells.size() != 3) refuse(fmt::format("has {} columns instead of three: time, x, y", cells.size()));
     const auto time = number_in(cells[0]);
     if (!time) refuse(fmt::format("'{}' is no time in ms", cells[0]));
-    if (!samples.empty() && *time < samples.back().time)
+    if (*time < last)
       refuse(fmt::format("{} ms is earlier than the sample before; sort the lines by time", cells[0]));
+    last = *time;
     if (nothing(cells[1]) && nothing(cells[2])) {  // a blink
-      if (!samples.empty()) samples.push_back({*time, samples.back().place});
+      if (samples.empty())
+        closed = closed.value_or(*time);
+      else
+        samples.push_back({*time, samples.back().place});
       continue;
     }
     const auto x = number_in(cells[1]), y = number_in(cells[2]);
@@ -109,6 +116,7 @@ Scanpath parse_scanpath(std::string_view text, const std::string& name) {
           "{}, {} lies three pictures or more beside the picture; are these pixels? name the columns "
           "x_px and y_px then",
           cells[1], cells[2]));
+    if (samples.empty() && closed) samples.push_back({*closed, place});
     samples.push_back({*time, place});
   }
   if (samples.empty())

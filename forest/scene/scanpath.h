@@ -32,7 +32,8 @@ class Scanpath {
 
 /// CSV: time in ms, x, y on each line. A header names the columns `time,x,y` for shares of the picture or `time,x_px,y_px` for
 /// pixels of a picture of `# size 1920x1080`, a line before it; without a header they are shares. Lines that begin with # and
-/// empty ones are left out; an x and y left empty or nan is a blink, in which the gaze stays.
+/// empty ones are left out; an x and y left empty or nan is a blink, in which the gaze stays; before
+/// the first place it is at that place.
 /// Throws InputError with the line of the first bad one: no number, not finite, earlier than the one before.
 Scanpath parse_scanpath(std::string_view text, const std::string& name = "scanpath");
 

@@ -33,6 +33,16 @@ TEST(Scanpath, ReadsPixelsBlinksCommentsAndForeignLineEnds) {
   EXPECT_EQ(parse_scanpath("\xef\xbb\xbftime,x,y\n0,.1,.2").samples().size(), 1u);  // as Excel begins a file
 }
 
+TEST(Scanpath, ABlinkAtTheBeginningTakesItsTime) {
+  const Scanpath path = parse_scanpath("time,x,y\n100,,\n350,,\n600,.2,.2\n1100,.8,.8\n");
+  EXPECT_EQ(path.duration(), 1000.);
+  EXPECT_EQ(path.at(0.), Vec2(.2f, .2f));
+  EXPECT_EQ(path.at(999.), Vec2(.2f, .2f));
+  EXPECT_EQ(path.at(1000.), Vec2(.8f, .8f));
+  EXPECT_THROW(parse_scanpath("time,x,y\n100,,\n50,,\n600,.2,.2\n"), InputError);
+  EXPECT_THROW(parse_scanpath("time,x,y\n100,,\n350,,\n"), InputError);
+}
+
 TEST(Scanpath, NamesTheBadLine) {
   const auto said = [](std::string_view text) {
     return refused<InputError>([&] { parse_scanpath(text, "gaze.csv"); });
