@@ -174,9 +174,15 @@ class Reader {
     circuit::Projection projection{name, edges.nodes("source"), edges.nodes("target"), {}};
     const auto* targets = instances_of(projection.target);
     if (!targets) {
-      warn("no-target",
-           fmt::format("edges {} end on population {}, of which no neuron is planted; they were left out",
-                       name, projection.target));
+      warn(
+          "no-target",
+          projection.target.empty()
+              ? fmt::format("edges {} do not say on which population they end (the attribute node_population "
+                            "of target_node_id); they were left out",
+                            name)
+              : fmt::format(
+                    "edges {} end on population {}, of which no neuron is planted; they were left out", name,
+                    projection.target));
       return;
     }
     const auto* sources = instances_of(projection.source);
@@ -222,8 +228,9 @@ class Reader {
                                     elsewhere, name));
     if (not_placed)
       warn("no-place",
-           fmt::format("{} edges of {} say neither section and position nor place; they were left out",
-                       not_placed, name));
+           fmt::format(
+               "{} edges of {} say neither section and position (0 to 1) nor place; they were left out",
+               not_placed, name));
     if (!projection.synapses.empty()) result_.projections.push_back(std::move(projection));
   }
 

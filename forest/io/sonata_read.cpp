@@ -68,6 +68,7 @@ class Assembler {
       if (type && *type != "biophysical" && *type != "astrocyte") {
         warn("not-biophysical",
              fmt::format("population {} is {}, without shapes; it was left out", name, type->dump()));
+        nodes_.shapeless.push_back(name);
         return;
       }
       add_population(NodePopulation(file, name, types ? &*types : nullptr, types_file.value_or("").string()),

@@ -329,9 +329,8 @@ class Packer {
 void pack(const Report& report, const circuit::Circuit& circuit, std::span<const Morphology> morphologies,
           const Nodes& nodes, std::span<const Spikes> spikes, const std::filesystem::path& out,
           const PackOptions& options, Progress& progress) {
-  if (!(options.range.low < options.range.high) || !std::isfinite(options.range.low) ||
-      !std::isfinite(options.range.high))
-    throw Error(fmt::format("a range from {} to {} holds no value; give its lower end first",
+  if (!(options.range.low < options.range.high) || !std::isfinite(options.range.high - options.range.low))
+    throw Error(fmt::format("a range from {} to {} holds no value that can be told; give its lower end first",
                             options.range.low, options.range.high));
   if (options.tile == 0 || options.tile > (1u << 24))
     throw Error(fmt::format("tiles of {} values are no good; give 1 to {}", options.tile, 1u << 24));

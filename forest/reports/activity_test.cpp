@@ -351,6 +351,11 @@ TEST(Activity, HasSpikesSortedByTime) {
   EXPECT_TRUE(a.spikes(3.5, 9.).empty());
   EXPECT_TRUE(a.spikes(9., 1.).empty());
   EXPECT_EQ(a.facts().spikes_left_out, 1u);
+  m.spikes.push_back({"spikes.h5", "inputs", {5., 6.}, {0, 77}});
+  EXPECT_THAT(complaint([&] { packed(m); }), HasSubstr("population inputs is not in the circuit"));
+  m.nodes.shapeless = {"inputs"};
+  EXPECT_EQ(packed(m).facts().spikes_left_out, 3u);
+  m.spikes.pop_back();
   m.spikes[0].nodes[0] = 8;
   EXPECT_THAT(complaint([&] { packed(m); }),
               HasSubstr("spikes.h5: node 8 of population column spikes and is not in"));

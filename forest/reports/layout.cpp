@@ -57,8 +57,18 @@ struct Shape {
   BranchOrder order;
 };
 
+bool is_shapeless(const Nodes& nodes, const std::string& population) {
+  return std::ranges::find(nodes.shapeless, population) != nodes.shapeless.end();
+}
+
 std::uint32_t population_of(const Nodes& nodes, const std::string& name, const std::string& source) {
   const auto found = std::ranges::find(nodes.populations, name);
+  if (is_shapeless(nodes, name))
+    throw InputError(
+        source, 0,
+        fmt::format("population {} is virtual, so that its nodes have no shape to show values on; "
+                    "choose another population, one of {}",
+                    name, fmt::join(nodes.populations, ", ")));
   if (found == nodes.populations.end())
     throw InputError(
         source, 0,
@@ -252,6 +262,10 @@ Match match(const Report& report, const circuit::Circuit& circuit, std::span<con
 PlacedSpikes place(std::span<const Spikes> spikes, const Nodes& nodes) {
   PlacedSpikes placed;
   for (const Spikes& of : spikes) {
+    if (is_shapeless(nodes, of.population)) {
+      placed.left_out += of.times.size();
+      continue;
+    }
     const std::uint32_t population = population_of(nodes, of.population, of.source);
     const auto refuse = [&](const std::string& sentence) { throw InputError(of.source, 0, sentence); };
     std::unordered_map<std::uint64_t, std::uint32_t> instance;

@@ -24,6 +24,7 @@ struct Nodes {
   std::vector<std::string> populations;
   std::vector<std::uint64_t> ends;  // of each population: one past its greatest node, planted or not
   std::vector<Node> of_instance;
+  std::vector<std::string> shapeless = {};  // populations of the circuit that are virtual as a whole
 };
 
 /// Values of compartments over time, as a matrix of steps × columns. A column is a compartment; those of one node are
