@@ -21,6 +21,8 @@ namespace {
 enum Stream : std::uint32_t { morphology_stream = 0x706c0000, rotation_stream, position_stream };
 
 constexpr int most_trials = 1000000;  // for one soma, before its layer is called full
+constexpr double densest =
+    .6;  // share of a layer, and of what its somata may stick out, that somata never fill
 
 /// Spheres in a grid. A sphere is entered in every cell that its box touches, so two that overlap share a
 /// cell.
@@ -101,18 +103,36 @@ float cell_width(const cortex::Column& column, std::vector<float> radii, float g
   return std::max(2.f * radii[radii.size() / 2] + gap, float(std::cbrt(room)));
 }
 
+/// µm³ of a layer's somata, with half the gap around each.
+double filled(const Recipe& recipe, std::uint32_t layer, std::span<const Instance> instances,
+              std::span<const float> radii) {
+  double sum = 0.;
+  for (std::size_t i = 0; i < instances.size(); ++i)
+    if (instances[i].layer == layer) sum += sphere_volume(double(radii[i] + recipe.soma_gap / 2.f));
+  return sum;
+}
+
 [[noreturn]] void refuse_layer(const Recipe& recipe, const cortex::Column& column, std::uint32_t layer,
                                std::span<const Instance> instances, std::span<const float> radii) {
-  double filled = 0.;
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < instances.size(); ++i)
-    if (instances[i].layer == layer)
-      filled += sphere_volume(double(radii[i] + recipe.soma_gap / 2.f)), ++count;
   throw Error(fmt::format(
       "the {} somata of layer {} do not fit without overlap: with their gaps they would fill {:.0f} % of it, "
       "and random packing stops at about 38 %; lower its density or the gap, or plant neurons with smaller "
       "somata",
-      count, recipe.layers[layer].name, 100. * filled / column.volume(layer)));
+      std::ranges::count(instances, layer, &Instance::layer), recipe.layers[layer].name,
+      100. * filled(recipe, layer, instances, radii) / column.volume(layer)));
+}
+
+/// What can never fit is refused before the first soma is tried: the last ones of a full layer take minutes.
+void refuse_overfull(const Recipe& recipe, const cortex::Column& column, std::span<const Instance> instances,
+                     std::span<const float> radii) {
+  const double widest = double(std::ranges::max(radii)), radius = double(recipe.radius) + widest;
+  for (std::uint32_t layer = 0; layer < column.layers().size(); ++layer) {
+    const cortex::Slab& slab = column.layers()[layer];
+    const double room =
+        std::numbers::pi * radius * radius * (double(slab.top) - double(slab.bottom) + 2. * widest);
+    if (filled(recipe, layer, instances, radii) > densest * room)
+      refuse_layer(recipe, column, layer, instances, radii);
+  }
 }
 
 /// The share of a layer's depth, from below, in which a neuron of this height ends under the pia.
@@ -159,6 +179,7 @@ void place(const Recipe& recipe, const cortex::Column& column, std::span<const f
            std::span<const float> shares, std::uint64_t seed, std::span<Instance> instances,
            Progress& progress) {
   if (instances.empty()) return;
+  refuse_overfull(recipe, column, instances, radii);
   std::vector<std::uint32_t> order(instances.size());
   std::iota(order.begin(), order.end(), 0u);
   std::ranges::stable_sort(order, std::greater{}, [&](std::uint32_t i) { return radii[i]; });

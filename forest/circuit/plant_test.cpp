@@ -160,6 +160,14 @@ TEST(Plant, ALayerThatCannotBePackedIsNamed) {
   }
 }
 
+TEST(Plant, AThinLayerMayBeFullerThanOneThatSomataDoNotStickOutOf) {
+  Recipe recipe = dense_recipe();
+  recipe.layers = {{.name = "thin", .thickness = 3.f, .density = 0., .count = 120, .mix = {1., 0.}}};
+  EXPECT_EQ(plant(recipe, candidates, 9).instances.size(), 120u);
+  recipe.layers[0].count = 2000;  // with all that they may stick out they would fill it
+  EXPECT_THROW(plant(recipe, candidates, 9), Error);
+}
+
 TEST(Plant, AnEmptyPopulationIsNamedUnlessNothingOfItIsWanted) {
   Recipe recipe = dense_recipe();
   recipe.types[1].population = "nobody";
