@@ -83,14 +83,6 @@ std::string csv_of(const scene::Forest& forest, const std::vector<scene::Profile
   return io::csv_of(sheet);
 }
 
-// Without the profiles of neurons that are hidden.
-scene::Slice visible(scene::Slice slice, const scene::Colouring& colouring) {
-  std::erase_if(slice.profiles, [&](const scene::Profile& p) {
-    return !colouring.states[p.instance].is(frame::State::visible);
-  });
-  return slice;
-}
-
 void film(const Options& options, const scene::Forest& forest, const Plane& plane,
           const scene::Colouring& colouring, const scene::SlicePicture& picture, Console& console) {
   const int count = std::max(2, int(std::lround(options.seconds * options.rate)));
@@ -98,7 +90,8 @@ void film(const Options& options, const scene::Forest& forest, const Plane& plan
   console.progress().begin("filming", std::size_t(count));
   for (int i = 0; i < count; ++i) {
     const Plane here = plane.moved(float(options.depth * i / (count - 1)));
-    film.add(scene::paint(visible(scene::slice(forest, here, picture.sheet()), colouring), colouring, picture)
+    film.add(scene::paint(scene::visible(scene::slice(forest, here, picture.sheet()), colouring), colouring,
+                          picture)
                  .pixels);
     console.progress().advance();
   }
@@ -166,7 +159,7 @@ void run(const Options& options, Console& console) {
   // A table tells of all that the plane cuts, a picture of what is in it.
   const bool table = extension == ".csv";
   const scene::Slice slice =
-      visible(scene::slice(forest, plane, table ? scene::Sheet{} : picture.sheet()), colouring);
+      scene::visible(scene::slice(forest, plane, table ? scene::Sheet{} : picture.sheet()), colouring);
   const auto areas = scene::areas(slice);
   if (table)
     write_unless_there(options.out, csv_of(forest, areas), options.force);

@@ -43,25 +43,23 @@ void SectionView::show_settings(const Settings& settings) {
                      settings.plane_at != settings_.plane_at ||
                      settings.normal_azimuth != settings_.normal_azimuth ||
                      settings.normal_elevation != settings_.normal_elevation;
-  const bool coloured = coloured_ && settings.view.colour_by == coloured_by_ &&
-                        settings.view.background == settings_.view.background;
   settings_ = settings;
-  if (moved || !coloured) soon_.start();
-  coloured_ = coloured;
+  if (moved) soon_.start();
   if (image_.isNull()) update();  // what is written instead
+}
+
+void SectionView::show_colouring(const scene::Colouring& colouring) {
+  colouring_ = colouring;
+  soon_.start();
 }
 
 void SectionView::draw() {
   if (!settings_.plane || !isVisible()) return;
-  if (!coloured_) {
-    colouring_ = scene::colour(forest_, settings_.view.colour_by, settings_.view.background);
-    coloured_by_ = settings_.view.colour_by;
-    coloured_ = true;
-  }
   const Plane plane = plane_of(settings_, forest_.soma_bounds().centre(), forest_.circuit().up);
   if (!centre_) centre_ = opening(plane);
   const scene::SlicePicture drawn = picture();
-  const frame::Image image = scene::paint(scene::slice(forest_, plane, drawn.sheet()), colouring_, drawn);
+  const frame::Image image = scene::paint(
+      scene::visible(scene::slice(forest_, plane, drawn.sheet()), colouring_), colouring_, drawn);
   image_ = QImage(image.pixels.data(), int(image.width), int(image.height), QImage::Format_RGBX8888).copy();
   image_.setDevicePixelRatio(devicePixelRatioF());
   update();
@@ -114,7 +112,8 @@ void SectionView::wheelEvent(QWheelEvent* event) {
   soon_.start();
 }
 
-SectionPanel::SectionPanel(scene::Forest forest, const Settings& settings, Change change, QWidget* parent)
+SectionPanel::SectionPanel(scene::Forest forest, const Settings& settings, const scene::Colouring& colouring,
+                           Change change, QWidget* parent)
     : QWidget(parent), view_(new SectionView(forest, this)), slider_(new QSlider(Qt::Horizontal, this)) {
   setAccessibleName(tr("Section"));
   const Bounds bounds = forest.soma_bounds();
@@ -130,8 +129,11 @@ SectionPanel::SectionPanel(scene::Forest forest, const Settings& settings, Chang
   column->setContentsMargins(4, 4, 4, 4);
   column->addWidget(view_, 1);
   column->addWidget(slider_);
+  show_colouring(colouring);
   show_settings(settings);
 }
+
+void SectionPanel::show_colouring(const scene::Colouring& colouring) { view_->show_colouring(colouring); }
 
 void SectionPanel::show_settings(const Settings& settings) {
   const QSignalBlocker quiet(slider_);

@@ -22,6 +22,8 @@ class SectionView final : public QWidget {
   explicit SectionView(scene::Forest forest, QWidget* parent = nullptr);
   /// Shows what `settings` say, soon.
   void show_settings(const Settings& settings);
+  /// Neurons have these colours, and are hidden where these hide them.
+  void show_colouring(const scene::Colouring& colouring);
 
  protected:
   void paintEvent(QPaintEvent* event) override;
@@ -40,8 +42,6 @@ class SectionView final : public QWidget {
   scene::Forest forest_;
   Settings settings_;
   scene::Colouring colouring_;
-  scene::ColourBy coloured_by_ = scene::ColourBy::type;
-  bool coloured_ = false;
   std::optional<Place> centre_;  // along the plane's right and up; none: nothing was cut yet
   double height_ = 200.;         // µm
   QPointF mouse_;
@@ -51,9 +51,11 @@ class SectionView final : public QWidget {
 
 class SectionPanel final : public QWidget {
  public:
-  SectionPanel(scene::Forest forest, const Settings& settings, Change change, QWidget* parent = nullptr);
+  SectionPanel(scene::Forest forest, const Settings& settings, const scene::Colouring& colouring,
+               Change change, QWidget* parent = nullptr);
   /// Shows `settings`, telling nobody.
   void show_settings(const Settings& settings);
+  void show_colouring(const scene::Colouring& colouring);
 
  private:
   SectionView* view_;

@@ -24,6 +24,10 @@ struct Subject {
 
   std::uint32_t index() const { return selection.pick.instance; }
   const circuit::Circuit& circuit() const { return forest.circuit(); }
+  const circuit::NodeRun& run() const {  // of nodes, in which it is
+    return *std::ranges::find_if(forest.nodes().runs,
+                                 [&](const auto& r) { return index() - r.first_instance < r.count; });
+  }
   std::uint32_t section_of(std::uint32_t segment) const {
     return forest.section_of_segment()[neuron.first_original + segment - neuron.first_segment];
   }
@@ -61,8 +65,12 @@ struct Row {
 };
 constexpr std::uint32_t none = 0xffffffffu;
 const Row<Subject> rows[] = {
-    {"neuron", "Neuron", "", "Id of the planted neuron, from 0",
+    {"neuron", "Neuron", "", "Number of the planted neuron in the forest, from 0",
      [](const Subject& s) { return Json(s.index()); }},
+    {"population", "Population", "", "Of the circuit, as SONATA calls it",
+     [](const Subject& s) { return Json(s.forest.nodes().populations[s.run().population]); }},
+    {"node_id", "Node", "", "Its number in its population: what reports and 'clamp --neuron' call it",
+     [](const Subject& s) { return Json(s.run().first_node + s.index() - s.run().first_instance); }},
     {"type", "Cell type", "", "From the recipe of the column",
      [](const Subject& s) { return Json(s.circuit().types[s.forest.types()[s.index()]].name); }},
     {"section", "Section", "", "Id of the section within its neuron, from 0",

@@ -99,6 +99,8 @@ Window::Window(scene::Forest forest, const scene::View& view, const QString& tit
     section_panel_->show_settings(viewport_->settings());
     if (!panel_rest_.isActive()) panel_rest_.start();
   });
+  connect(viewport_, &Viewport::recoloured, this,
+          [this] { section_panel_->show_colouring(viewport_->colouring()); });
   connect(viewport_, &Viewport::selected, this, [this] {
     selection_panel_->show_facts(selected_facts());
     show_targets();
@@ -176,7 +178,8 @@ void Window::add_docks() {
        },
        [this](const QString& expression) { return add_target(expression); }},
       this);
-  section_panel_ = new SectionPanel(viewport_->forest(), viewport_->settings(), change, this);
+  section_panel_ =
+      new SectionPanel(viewport_->forest(), viewport_->settings(), viewport_->colouring(), change, this);
   const std::pair<const char*, QWidget*> docks[] = {{"Selection", selection_panel_},
                                                     {"Targets", targets_panel_},
                                                     {"View", scroll},

@@ -156,6 +156,12 @@ Sheet SlicePicture::sheet() const {
   return {centre - half, centre + half};
 }
 
+Slice visible(Slice slice, const Colouring& colouring) {
+  std::erase_if(slice.profiles,
+                [&](const Profile& p) { return !colouring.states[p.instance].is(frame::State::visible); });
+  return slice;
+}
+
 frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePicture& picture) {
   const std::size_t width = picture.width_pixels, height = picture.height_pixels;
   const Ground ground = ground_of(picture.background);

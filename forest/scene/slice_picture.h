@@ -21,6 +21,10 @@ struct SlicePicture {
   double pixel() const { return height / height_pixels; }  // µm
   Sheet sheet() const;
 };
+
+/// Without the profiles of neurons that are hidden.
+Slice visible(Slice slice, const Colouring& colouring);
+
 frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePicture& picture);
 
 /// The same as SVG with one path a neuron, its profiles united; ids are the neurons' numbers.
