@@ -6,6 +6,8 @@
 #include <functional>
 #include <map>
 #include <numeric>
+#include <span>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -61,6 +63,15 @@ Vec3 along(const std::array<std::uint32_t, 3>& ramp, float t) {
   const float at = 2.f * std::clamp(t, 0.f, 1.f);
   const std::size_t i = at < 1.f ? 0 : 1;
   return light_of(ramp[i]) + (light_of(ramp[i + 1]) - light_of(ramp[i])) * (at - float(i));
+}
+
+// "L4 pyramidal cell" and "L23_PC" without the layer: types whose names differ in nothing else are one family.
+std::string_view family_of(std::string_view type) {
+  if (type.size() < 2 || type[0] != 'L' || type[1] < '0' || type[1] > '9') return type;
+  std::size_t i = type.find_first_not_of("0123456789/-", 1);
+  if (i != type.npos && std::string_view("abAB").find(type[i]) != std::string_view::npos) ++i;
+  return i < type.size() && (type[i] == ' ' || type[i] == '_') && i + 1 < type.size() ? type.substr(i + 1)
+                                                                                      : type;
 }
 
 /// Of `count` things from the pia downwards: yellow to violet, between the colours of the table where there are more than it has.
@@ -164,12 +175,30 @@ class Painter {
     }
     return result;
   }
-  // Of a type, `t` from 0 under the pia to 1.
-  Vec3 type_colour(std::size_t type, float t) const {
-    const auto& types = forest_.circuit().types;
-    if (!types[type].glia) return along(ramps[type % ramps.size()], t);
-    const auto before = std::count_if(types.begin(), types.begin() + std::ptrdiff_t(type),
-                                      [](const circuit::CellType& other) { return other.glia; });
+  struct Family {
+    std::string name;
+    bool glia;
+
+    bool operator==(const Family&) const = default;
+  };
+  struct Families {
+    std::vector<Family> all;
+    std::vector<std::size_t> of_type;
+  };
+  Families families() const {
+    Families result;
+    for (const circuit::CellType& type : forest_.circuit().types) {
+      const Family own{std::string(family_of(type.name)), type.glia};
+      const auto found = std::ranges::find(result.all, own);
+      result.of_type.push_back(std::size_t(found - result.all.begin()));
+      if (found == result.all.end()) result.all.push_back(own);
+    }
+    return result;
+  }
+  // Of a family of types, `t` from 0 under the pia to 1.
+  static Vec3 family_colour(std::span<const Family> families, std::size_t family, float t) {
+    if (!families[family].glia) return along(ramps[family % ramps.size()], t);
+    const auto before = std::ranges::count(families.first(family), true, &Family::glia);
     return along(glial[std::size_t(before) % glial.size()], t);
   }
 
@@ -232,34 +261,36 @@ class Painter {
     return [first](std::uint32_t) { return first; };
   }
 
-  // The hue tells the type, its step the layer. Pairs of them are numbered as they are met.
+  // The hue tells the family of types, its step the layer. Pairs of them are numbered as they are met.
   HueOf by_type() {
     const auto& circuit = forest_.circuit();
-    const std::size_t layers = circuit.layers.size(), pairs = circuit.types.size() * layers;
-    if (pairs > (1u << 20)) {  // by the type alone
+    auto [all, of_type] = families();
+    const std::size_t layers = circuit.layers.size(), pairs = all.size() * layers;
+    if (pairs > (1u << 20)) {  // by the family alone
       const auto first = std::uint16_t(hues_.size());
-      for (std::size_t t = 0; t < circuit.types.size(); ++t)
-        add_hue(type_colour(t, .5f), circuit.types[t].name);
-      return [this, first](std::uint32_t i) { return hue_at(first, forest_.types()[i]); };
+      for (std::size_t f = 0; f < all.size(); ++f) add_hue(family_colour(all, f, .5f), all[f].name);
+      return [this, first, of_type = std::move(of_type)](std::uint32_t i) {
+        return hue_at(first, of_type[forest_.types()[i]]);
+      };
     }
     std::vector<std::uint16_t> hue_of(pairs);
     std::vector<bool> met(pairs);
     for (std::uint32_t i = 0; i < looks_.size(); ++i)
-      met[forest_.types()[i] * layers + forest_.layers()[i]] = true;
-    for (std::size_t type = 0; type < circuit.types.size(); ++type) {
-      const auto begin = met.begin() + std::ptrdiff_t(type * layers);
+      met[of_type[forest_.types()[i]] * layers + forest_.layers()[i]] = true;
+    for (std::size_t f = 0; f < all.size(); ++f) {
+      const auto begin = met.begin() + std::ptrdiff_t(f * layers);
       const auto steps = std::count(begin, begin + std::ptrdiff_t(layers), true);
       std::ptrdiff_t step = 0;
       for (std::size_t layer = 0; layer < layers; ++layer)
-        if (met[type * layers + layer]) {
-          hue_of[type * layers + layer] = add_hue(
-              type_colour(type, steps > 1 ? float(step) / float(steps - 1) : .5f) * (light_ ? .7f : 1.f),
-              circuit.types[type].name, false, steps > 1 ? circuit.layers[layer].name : "");
+        if (met[f * layers + layer]) {
+          hue_of[f * layers + layer] = add_hue(
+              family_colour(all, f, steps > 1 ? float(step) / float(steps - 1) : .5f) * (light_ ? .7f : 1.f),
+              all[f].name, false, steps > 1 ? circuit.layers[layer].name : "");
           ++step;
         }
     }
-    return [this, layers, hue_of = std::move(hue_of)](std::uint32_t i) {
-      return hue_of[forest_.types()[i] * layers + forest_.layers()[i]];
+    return [this, layers, of_type = std::move(of_type), hue_of = std::move(hue_of)](std::uint32_t i) {
+      return hue_of[of_type[forest_.types()[i]] * layers + forest_.layers()[i]];
     };
   }
 
