@@ -2,6 +2,7 @@
 // brainforest demo: the main job, from nothing to a walk in the forest.
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 
 #include <CLI/App.hpp>
@@ -13,6 +14,7 @@
 #include "forest/core/file.h"
 #include "forest/core/hash.h"
 #include "forest/core/parallel.h"
+#include "forest/cortex/environment.h"
 #include "forest/io/format.h"
 #include "forest/io/png.h"
 #include "forest/io/sonata.h"
@@ -40,39 +42,62 @@ struct Options {
   bool view = false;
 };
 
-/// A hundred neurons in all.
-struct Share {
-  const char* grammar;
-  std::size_t count;
-};
-constexpr Share shares[] = {{"pyramidal", 60}, {"purkinje", 20}, {"motoneuron", 20}};
+constexpr std::uint32_t neurons = 100;   // grown
 constexpr double traced_fraction = .25;  // of every layer
 
 struct Figures {
-  std::size_t grown = 0, grown_segments = 0, traced = 0, unread = 0;
+  std::size_t grown = 0, traced = 0, unread = 0;
   double growing = 0.;
   float lowest_traced = INFINITY;  // height of the lowest traced cell above its soma, µm
 };
 
-void grow_into(const std::string& repo, const Options& options, Console& console, Figures& figures) {
+/// Grows a stock for the types that a recipe would grow where they stand, of each some at three depths of each of its layers, and
+/// lets the recipe plant from it.
+void grow_into(const std::string& repo, circuit::Recipe& recipe, const Options& options, Console& console,
+               Figures& figures) {
+  constexpr float depths[] = {.05f, .35f, .65f};  // of a layer; planted ones stand as deep or deeper
+  struct Batch {
+    std::size_t type, layer;
+    float depth;
+  };
+  std::vector<Batch> batches;
+  std::vector<double> weights;
+  const auto wanted = circuit::counts(recipe);
+  for (std::size_t type = 0; type < recipe.types.size(); ++type)
+    for (std::size_t layer = 0; layer < wanted.size(); ++layer)
+      for (const float depth : depths)
+        if (wanted[layer][type])
+          batches.push_back({type, layer, depth}), weights.push_back(std::sqrt(double(wanted[layer][type])));
+  const auto counts = circuit::apportion(neurons, weights);
+
+  const std::vector<cortex::Slab> layers = circuit::slabs(recipe);
+  const cortex::Environment tissue(layers);
+  std::map<std::string, std::uint64_t> grown;  // by each grammar
   auto repository = repository::Repository::open(repo, repository::Access::write);
   auto transaction = repository.begin();
-  for (const Share& share : shares) {
-    const lsystem::Grammar grammar = find_grammar(share.grammar);
+  for (std::size_t b = 0; b < batches.size(); ++b) {
+    const circuit::CellType& type = recipe.types[batches[b].type];
+    const cortex::Slab& layer = layers[batches[b].layer];
+    const lsystem::Grammar grammar = find_grammar(circuit::source_of(recipe, batches[b].type).grammar);
+    const std::uint64_t first = grown[grammar.name];
+    const cortex::Site site{&tissue, {0.f, std::lerp(layer.top, layer.bottom, batches[b].depth), 0.f}};
     const auto start = Clock::now();
-    const auto neurons = lsystem::grow_population(grammar, share.count, options.seed, console.progress());
+    const auto cells =
+        lsystem::grow_population(grammar, counts[b], options.seed, console.progress(), first, site);
     figures.growing += seconds_since(start);
     const std::string hash = repository.add_grammar(grammar.name, grammar.text, distributions_of(grammar));
-    for (std::size_t i = 0; i < neurons.size(); ++i) {
-      repository.add(neurons[i], {.name = fmt::format("{}-{}-{:05}", grammar.name, options.seed, i),
-                                  .population = share.grammar,
-                                  .type = grammar.title,
-                                  .provenance = repository::Grown{grammar.name, hash, options.seed, i}});
-      figures.grown_segments += neurons[i].segment_count();
-    }
-    figures.grown += neurons.size();
+    for (std::size_t i = 0; i < cells.size(); ++i)
+      repository.add(cells[i],
+                     {.name = fmt::format("{}-{}-{:05}", grammar.name, options.seed, first + i),
+                      .population = type.name,
+                      .layer = layer.name,
+                      .type = grammar.title,
+                      .provenance = repository::Grown{grammar.name, hash, options.seed, first + i}});
+    grown[grammar.name] += cells.size(), figures.grown += cells.size();
   }
   transaction.commit();
+  for (std::size_t type = 0; type < recipe.types.size(); ++type)
+    recipe.types[type].population = recipe.types[type].name, recipe.sources[type].grammar.clear();
 }
 
 void import_into(const std::string& repo, const fs::path& folder, Console& console, Figures& figures) {
@@ -145,12 +170,12 @@ void run(const Options& options, Console& console) {
   write_file(about, told);
   for (const char* end : {"", "-wal", "-shm", "-journal"}) fs::remove(repo + end, error);
   Figures figures;
-  grow_into(repo, options, console, figures);
+  circuit::Recipe recipe = find_recipe("cortex-1000");
+  grow_into(repo, recipe, options, console, figures);
   if (!options.traced.empty()) import_into(repo, options.traced, console, figures);
   console.say(
-      fmt::format("grown    {} neurons of {} types, stored in {}", figures.grown, std::size(shares), repo));
+      fmt::format("grown    {} neurons of {} types, stored in {}", figures.grown, recipe.types.size(), repo));
 
-  circuit::Recipe recipe = find_recipe("column-1000");
   if (figures.traced)
     recipe = circuit::with_type(recipe, {"traced cell", "traced", true}, traced_fraction,
                                 figures.lowest_traced - circuit::pia_slack);

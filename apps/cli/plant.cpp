@@ -164,7 +164,8 @@ std::function<void()> plant(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
   command
       .add_option("--recipe", options->recipe,
-                  "A recipe (TOML), or the name of one that ships: column-1000, column-10000, human-frontal, "
+                  "A recipe (TOML), or the name of one that ships: cortex-1000, column-1000, column-10000, "
+                  "human-frontal, "
                   "human-visual, rat-barrel-column, rodent-types")
       ->required()
       ->type_name("FILE|NAME");

@@ -6,7 +6,7 @@ unset DISPLAY  # NEURON opens windows where there is one
 export PATH="$(dirname "$BRAINFOREST"):$PATH"
 export EDITOR="sed -i '\$ a # mine'"
 
-grep -e '^brainforest ' -e '^/usr/bin/python3 ' -e '^mv ' "$FOREST_SOURCE_DIR/README.md" | grep -v -e ' view ' -e ' fetch ' |  # a window needs a display, a service a network
+grep -e '^brainforest ' -e '^/usr/bin/python3 ' -e '^mv ' "$FOREST_SOURCE_DIR/README.md" | grep -v -e ' view ' -e ' fetch ' -e ' cortex ' -e ' --elements ' |  # a window needs a display, a service a network, elements minutes
   sed 's/^brainforest movie .*/& --size 320x180 --fps 5 --samples 2/' >commands
 grep -q '^brainforest import' commands
 grep -q 'simulate_column.py' commands
