@@ -229,6 +229,29 @@ TEST(Appearance, ColoursThatAreSharedSayByHowMany) {
   EXPECT_LE(by_type.legend.size(), 16u);
 }
 
+TEST(Appearance, TypesThatDifferInTheirLayerAloneAreOneFamily) {
+  circuit::Circuit c = testing::sample_circuit(60);
+  c.types = {{"L2/3 pyramidal cell", "p", true},
+             {"L23_BC", "p", false},
+             {"L4 pyramidal cell", "p", true},
+             {"L4_BC", "p", false},
+             {"L5", "p", true},
+             {"Lugaro cell", "p", false}};
+  c.layers = {{"upper", 50.f, 100.f}, {"lower", 0.f, 50.f}};
+  for (std::size_t i = 0; i < c.instances.size(); ++i) {
+    c.instances[i].type = std::uint32_t(i % 6);
+    c.instances[i].layer = i % 6 == 2 || i % 6 == 3;
+  }
+  View view;
+  view.colour_by = ColourBy::type;
+  const Forest f = Forest::from_bytes(pack(c, testing::sample_neurons()));
+  const auto legend = colour(Targets(f), view).legend;
+  std::vector<std::string> names;
+  for (const LegendEntry& entry : legend) names.push_back(entry.name);
+  EXPECT_THAT(names, ::testing::UnorderedElementsAre("pyramidal cell, upper", "pyramidal cell, lower",
+                                                     "BC, upper", "BC, lower", "L5", "Lugaro cell"));
+}
+
 TEST(Appearance, NoTwoLayersHaveOneColour) {
   circuit::Circuit c = testing::sample_circuit(48);
   c.layers.clear();
