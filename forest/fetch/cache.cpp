@@ -20,6 +20,7 @@
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 #include "forest/core/hash.h"
+#include "forest/core/json.h"
 
 namespace forest::fetch {
 namespace {
@@ -50,7 +51,7 @@ std::optional<Kept> read(const fs::path& path, const std::string& address) {
     const std::string_view text = file.text();
     const std::size_t end = text.find('\n');
     if (end == std::string_view::npos) return std::nullopt;
-    const Json line = Json::parse(text.substr(0, end));
+    const auto line = parse_json<Json>(text.substr(0, end), path.string(), "");
     Kept kept{.address = line.at("address"),
               .etag = line.at("etag"),
               .modified = line.at("modified"),

@@ -13,6 +13,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/core/json.h"
 #include "forest/core/parallel.h"
 #include "forest/reports/activity_layout.h"
 
@@ -210,7 +211,8 @@ Activity Activity::check(std::shared_ptr<Data> data, std::span<const std::byte> 
   std::vector<std::uint64_t> column_counts;
   try {
     const auto text = d.parts[text_part];
-    const Json json = Json::parse(std::string_view(reinterpret_cast<const char*>(text.data()), text.size()));
+    const auto json = parse_json<Json>({reinterpret_cast<const char*>(text.data()), text.size()}, d.name,
+                                       "pack the report again");
     d.facts = understand(json);
     column_counts = json.at("columns").get<std::vector<std::uint64_t>>();
   } catch (const nlohmann::json::exception&) {

@@ -13,6 +13,7 @@
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 #include "forest/core/hash.h"
+#include "forest/core/json.h"
 #include "forest/core/parallel.h"
 #include "forest/scene/forest_layout.h"
 #include "forest/scene/placed.h"
@@ -27,8 +28,7 @@ Vec3 vector_of(const Json& json) {
   return {json.at(0).get<float>(), json.at(1).get<float>(), json.at(2).get<float>()};
 }
 
-circuit::Circuit understand(std::string_view text, circuit::NodeNames& nodes) {
-  const Json json = Json::parse(text);
+circuit::Circuit understand(const Json& json, circuit::NodeNames& nodes) {
   circuit::Circuit c;
   c.name = json.at("name");
   c.radius = json.at("radius");
@@ -237,7 +237,9 @@ void Forest::Data::find_parts(std::span<const std::byte> whole, const Refuse& re
 void Forest::Data::read_description(const Refuse& refuse) {
   const auto text = parts[Part::text];
   try {
-    circuit = understand({reinterpret_cast<const char*>(text.data()), text.size()}, nodes);
+    circuit = understand(parse_json<Json>({reinterpret_cast<const char*>(text.data()), text.size()},
+                                          refuse.name, "pack the circuit again"),
+                         nodes);
   } catch (const nlohmann::json::exception&) {
     refuse.unless(false, "has a damaged description");
   }

@@ -231,6 +231,17 @@ TEST(ForestFile, WhatIsChangedBehindRightChecksumsIsRefusedOrCanBeSeen) {
   EXPECT_GT(seen, 100u);
 }
 
+TEST(ForestFile, BracketsWithinBracketsAreRefusedAndNotFollowed) {
+  auto bytes = pack(sample_circuit(), sample_neurons());
+  layout::Header header;
+  std::memcpy(&header, bytes.data(), sizeof header);
+  const layout::Entry& text = header.table[layout::text];
+  std::memset(&bytes[text.offset], '[', text.count);
+  testing::put_forest_right(bytes);
+  EXPECT_NE(forest::refused([&] { Forest::from_bytes(std::move(bytes)); }).find("brackets"),
+            std::string::npos);
+}
+
 TEST(ForestFile, RefusesACircuitThatDoesNotFitItsNeurons) {
   EXPECT_THROW(pack(sample_circuit(), std::vector<Morphology>{Morphology()}), Error);
   auto circuit = sample_circuit();

@@ -19,6 +19,7 @@
 #include "forest/core/file.h"
 #include "forest/core/half.h"
 #include "forest/core/hash.h"
+#include "forest/core/json.h"
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
 #include "forest/scene/closeness.h"
@@ -392,7 +393,7 @@ Synapses Synapses::check(std::shared_ptr<Data> data, std::span<const std::byte> 
   const auto all = data->as<Synapse>(FilePart::synapses);
   try {
     const auto text = data->as<char>(FilePart::text);
-    const Json description = Json::parse(text.begin(), text.end());
+    const auto description = parse_json<Json>({text.data(), text.size()}, name, "pack the circuit again");
     for (const Json& p : description.at("projections")) {
       ProjectionFacts facts{p.at("name"), p.at("source"), p.at("target"), p.at("first"), p.at("count")};
       const std::uint64_t next =
