@@ -11,7 +11,6 @@
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
-#include "forest/core/parallel.h"
 #include "forest/io/format.h"
 #include "forest/repository/names.h"
 
@@ -46,21 +45,6 @@ void run_tables(const Options& options, const std::vector<NeuronRow>& rows, Cons
   console.say(fmt::format("{} written to {}", counted(rows.size(), "neuron"), options.out.string()));
 }
 
-/// use(i, neuron) for every row, by any thread; neuron() reads it.
-template <class Use>
-void each_neuron(const Options& options, const std::vector<NeuronRow>& rows, const char* stage,
-                 Console& console, const Use& use) {
-  console.progress().begin(stage, rows.size());
-  parallel_ranges(rows.size(), 16, [&](std::size_t begin, std::size_t end) {
-    const Repository repository = Repository::open(options.repo, Access::read);  // each thread has its own
-    for (std::size_t i = begin; i < end; ++i) {
-      use(i, [&] { return repository.morphology(rows[i].id); });
-      console.progress().advance();
-    }
-  });
-  console.progress().end();
-}
-
 void report(const Options& options, const std::vector<NeuronRow>& rows, const std::vector<fs::path>& files,
             const std::vector<std::vector<io::Warning>>& losses, std::string_view format, Console& console) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
@@ -84,7 +68,7 @@ void run_together(const Options& options, const std::vector<NeuronRow>& rows, co
   for (const NeuronRow& row : rows) populations.insert(row.population);
   std::vector<io::NamedMorphology> cells(rows.size());
   std::vector<std::vector<io::Warning>> losses(rows.size());
-  each_neuron(options, rows, "exporting", console, [&](std::size_t i, const auto& neuron) {
+  each_neuron(options.repo, rows, "exporting", console.progress(), [&](std::size_t i, const auto& neuron) {
     const std::string name = file_name(rows[i].name);  // groups are separated by slashes as folders are
     cells[i] = {populations.size() > 1 ? file_name(rows[i].population) + '/' + name : name, neuron()};
     losses[i] = io::losses(cells[i].morphology, format.keeps);
@@ -116,8 +100,8 @@ void run(const Options& options, Console& console) {
     const fs::path folder = populations.size() > 1 ? options.out / file_name(row.population) : options.out;
     files.push_back(folder / (file_name(row.name) + std::string(format.extensions[0])));
   }
-  const auto each = [&](const char* stage, const auto& use) {
-    each_neuron(options, rows, stage, console, use);
+  const auto each = [&](const char* stage, const UseNeuron& use) {
+    each_neuron(options.repo, rows, stage, console.progress(), use);
   };
   const auto written = [&](std::size_t i, const Morphology& m) {
     try {

@@ -79,11 +79,13 @@ constexpr std::array<std::pair<std::string_view, std::string repository::NeuronR
      {"species", &repository::NeuronRow::species},
      {"population", &repository::NeuronRow::population}}};
 
+constexpr const char* measuring = "measuring";
+
 /// Neurons to measure, whatever they come from.
 struct Neurons {
-  std::vector<std::string> names, groups;  // groups: only with --by; of a file its folder
-  std::vector<repository::NeuronId> ids;   // of a repository's
-  std::function<std::function<Morphology(std::size_t)>()> reader;  // reads the i-th; each thread has its own
+  std::vector<std::string> names, groups;      // groups: only with --by; of a file its folder
+  std::vector<repository::NeuronId> ids;       // of a repository's
+  std::function<void(const UseNeuron&)> each;  // as each_neuron()
   std::function<std::string()> guesses = [] { return std::string(); };  // what reading guessed, a sentence
   std::function<bool(const Error&, std::size_t)> may_skip;              // of a file's, as in files.h
 };
@@ -97,7 +99,14 @@ Neurons of_files(const Options& options, Console& console) {
     neurons.names[i] = (cell.empty() ? files->file(i) : files->file(i) / cell).string();
   });
   if (!options.by.empty()) neurons.groups = folder_names(files->each());
-  neurons.reader = [files] { return [files](std::size_t i) { return files->read(i); }; };
+  neurons.each = [files, &progress = console.progress()](const UseNeuron& use) {
+    progress.begin(measuring, files->size());
+    parallel_for(files->size(), 8, [&](std::size_t i) {
+      use(i, [&] { return files->read(i); });
+      progress.advance();
+    });
+    progress.end();
+  };
   neurons.guesses = [files] { return files->guesses(); };
   neurons.may_skip = [files, named = options.files](const Error& error, std::size_t i) {
     return may_skip(error, files->file(i), named);
@@ -105,7 +114,7 @@ Neurons of_files(const Options& options, Console& console) {
   return neurons;
 }
 
-Neurons of_repository(const Options& options) {
+Neurons of_repository(const Options& options, Console& console) {
   using namespace repository;
   const auto rows = pick_neurons(Repository::open(options.repo, Access::read), {}, options.population);
   if (rows.empty()) throw Error(fmt::format("{} holds no neuron; import or grow some first", options.repo));
@@ -116,9 +125,8 @@ Neurons of_repository(const Options& options) {
     for (const auto& [word, member] : groupings)
       if (word == options.by) neurons.groups.push_back(row.*member);
   }
-  neurons.reader = [place = options.repo, ids = neurons.ids] {
-    const auto open = std::make_shared<Repository>(Repository::open(place, Access::read));
-    return [open, &ids](std::size_t i) { return open->morphology(ids[i]); };
+  neurons.each = [place = options.repo, rows, &progress = console.progress()](const UseNeuron& use) {
+    each_neuron(place, rows, measuring, progress, use);
   };
   return neurons;
 }
@@ -437,22 +445,16 @@ void run(const Options& options, Console& console) {
     std::string error;
     bool skipped = false;
   };
-  const Neurons neurons = options.repo.empty() ? of_files(options, console) : of_repository(options);
+  const Neurons neurons = options.repo.empty() ? of_files(options, console) : of_repository(options, console);
   std::vector<Measured> measured(neurons.names.size());
-  console.progress().begin("measuring", measured.size());
-  parallel_ranges(measured.size(), 8, [&](std::size_t begin, std::size_t end) {
-    const auto read = neurons.reader();
-    for (std::size_t i = begin; i < end; ++i) {
-      try {
-        measured[i].rows = rows(options, picks, neurons.names[i], Arbors(read(i), kinds));
-      } catch (const Error& error) {
-        measured[i].error = error.what();
-        measured[i].skipped = options.repo.empty() && neurons.may_skip(error, i);
-      }
-      console.progress().advance();
+  neurons.each([&](std::size_t i, const auto& neuron) {
+    try {
+      measured[i].rows = rows(options, picks, neurons.names[i], Arbors(neuron(), kinds));
+    } catch (const Error& error) {
+      measured[i].error = error.what();
+      measured[i].skipped = options.repo.empty() && neurons.may_skip(error, i);
     }
   });
-  console.progress().end();
   if (const std::string guesses = neurons.guesses(); !guesses.empty()) console.warn(guesses);
 
   Table table{columns(options, picks), {}};

@@ -42,11 +42,6 @@ struct Options {
 
 std::string full_name(const ModelRow& model) { return fmt::format("{}@{}", model.name, model.version); }
 
-Repository open_to_write(const std::string& repo) {
-  Repository::open(repo, Access::read);  // one that is missing is not made
-  return Repository::open(repo, Access::write);
-}
-
 Json json_of(const ModelRow& model) {
   Json distributions = Json::array();
   for (const auto& [name, version] : model.distributions)

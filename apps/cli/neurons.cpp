@@ -9,6 +9,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/number.h"
+#include "forest/core/parallel.h"
 #include "forest/repository/names.h"
 
 namespace forest::cli {
@@ -40,6 +41,11 @@ NeuronRow pick(const Repository& repository, const std::string& name, const std:
 
 }  // namespace
 
+Repository open_to_write(const std::string& repo) {
+  Repository::open(repo, Access::read);
+  return Repository::open(repo, Access::write);
+}
+
 std::vector<NeuronRow> pick_neurons(const Repository& repository, const std::vector<std::string>& names,
                                     const std::string& population) {
   std::vector<NeuronRow> rows;
@@ -56,6 +62,19 @@ std::vector<NeuronRow> pick_neurons(const Repository& repository, const std::vec
   }
   for (const std::string& name : names) rows.push_back(pick(repository, name, population));
   return rows;
+}
+
+void each_neuron(const std::string& repo, std::span<const NeuronRow> rows, const char* stage,
+                 Progress& progress, const UseNeuron& use) {
+  progress.begin(stage, rows.size());
+  parallel_ranges(rows.size(), 16, [&](std::size_t begin, std::size_t end) {
+    const Repository repository = Repository::open(repo, Access::read);  // an object belongs to one thread
+    for (std::size_t i = begin; i < end; ++i) {
+      use(i, [&] { return repository.morphology(rows[i].id); });
+      progress.advance();
+    }
+  });
+  progress.end();
 }
 
 nlohmann::ordered_json json_of(const NeuronRow& row) {

@@ -23,6 +23,7 @@
 
 #include "apps/cli/console.h"
 #include "apps/cli/grammars.h"
+#include "apps/cli/neurons.h"
 
 namespace forest::cli {
 namespace {
@@ -215,17 +216,11 @@ Stock stock_of(const circuit::Recipe& recipe, const std::vector<bool>& wanted, c
   const auto rows = rows_for(recipe, wanted, repo);
   const auto names = names_of(rows);
   Stock stock{std::vector<circuit::Candidate>(rows.size()), std::vector<Morphology>(rows.size())};
-  progress.begin("loading", rows.size());
-  parallel_ranges(rows.size(), 64, [&](std::size_t begin, std::size_t end) {
-    const Repository repository = Repository::open(repo, Access::read);  // an object belongs to one thread
-    for (std::size_t i = begin; i < end; ++i) {
-      const Morphology& neuron = stock.neurons[i] = centred(repository.morphology(rows[i].id));
-      stock.candidates[i] = {names[i], rows[i].population, neuron.soma().sphere().radius,
-                             neuron.bounds().empty() ? 0.f : neuron.bounds().high.y()};
-      progress.advance();
-    }
+  each_neuron(repo, rows, "loading", progress, [&](std::size_t i, const auto& read) {
+    const Morphology& neuron = stock.neurons[i] = centred(read());
+    stock.candidates[i] = {names[i], rows[i].population, neuron.soma().sphere().radius,
+                           neuron.bounds().empty() ? 0.f : neuron.bounds().high.y()};
   });
-  progress.end();
   for (std::size_t begin = 0, end; begin < rows.size(); begin = end) {  // each population
     const std::string& population = rows[begin].population;
     for (end = begin + 1; end < rows.size() && rows[end].population == population;) ++end;

@@ -22,8 +22,7 @@ struct Options {
 };
 
 void run(const Options& options, Console& console) {
-  Repository::open(options.repo, Access::read);  // one that is missing is not made
-  Repository repository = Repository::open(options.repo, Access::write);
+  Repository repository = open_to_write(options.repo);
   auto transaction = repository.begin();
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   std::vector<std::vector<std::string>> lines;

@@ -82,16 +82,18 @@ Sample of_files(const std::vector<std::string>& words, Console& console) {
   return sample;
 }
 
-Sample of_repository(const std::string& population, const std::string& place) {
+Sample of_repository(const std::string& population, const std::string& place, Console& console) {
   using namespace repository;
-  Repository open = Repository::open(place, Access::read);
+  const auto rows = pick_neurons(Repository::open(place, Access::read), {}, population);
   Sample sample;
   sample.name = population.empty() ? place : population;
-  for (const NeuronRow& row : pick_neurons(open, {}, population)) {
+  for (const NeuronRow& row : rows) {
     sample.cells.push_back(population.empty() ? row.population + '/' + row.name : row.name);
     sample.types.push_back(row.type.empty() ? row.population : row.type);
-    sample.neurons.push_back(open.morphology(row.id));
   }
+  sample.neurons.resize(rows.size());
+  each_neuron(place, rows, "reading", console.progress(),
+              [&](std::size_t i, const auto& neuron) { sample.neurons[i] = neuron(); });
   return sample;
 }
 
@@ -122,7 +124,7 @@ Sample read_sample(const std::vector<std::string>& words, const std::string& rep
     if (std::erase_if(populations, [&](const std::string& word) { return !met.insert(word).second; }))
       console.warn("a population is named more than once and taken once");
     for (const std::string& word : populations) {
-      Sample part = of_repository(word, repo);
+      Sample part = of_repository(word, repo, console);
       sample.name += (sample.name.empty() ? "" : " + ") + part.name;
       std::ranges::move(part.cells, std::back_inserter(sample.cells));
       std::ranges::move(part.types, std::back_inserter(sample.types));

@@ -13,12 +13,12 @@
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 #include "forest/core/lower.h"
-#include "forest/core/parallel.h"
 #include "forest/io/workbook.h"
 #include "forest/statistics/metric.h"
 #include "forest/statistics/summary.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/neurons.h"
 
 namespace forest::cli {
 namespace {
@@ -138,15 +138,9 @@ std::vector<double> mean_sholl(const std::string& repo, const std::vector<reposi
                                Progress& progress) {
   std::vector<std::vector<double>> crossings(neurons.size());
   const statistics::Metric& metric = *statistics::find_metric("sholl_crossings");
-  progress.begin("counting crossings", neurons.size());
-  parallel_ranges(neurons.size(), 16, [&](std::size_t begin, std::size_t end) {
-    const Repository repository = Repository::open(repo, repository::Access::read);
-    for (std::size_t i = begin; i < end; ++i) {
-      crossings[i] = metric.values(statistics::Arbors(repository.morphology(neurons[i].id)));
-      progress.advance();
-    }
+  each_neuron(repo, neurons, "counting crossings", progress, [&](std::size_t i, const auto& neuron) {
+    crossings[i] = metric.values(statistics::Arbors(neuron()));
   });
-  progress.end();
   std::vector<double> mean;
   for (const auto& values : crossings) {
     if (values.size() > mean.size()) mean.resize(values.size());
