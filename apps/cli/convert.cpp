@@ -19,6 +19,7 @@
 #include "forest/repository/names.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/filed_neurons.h"
 #include "apps/cli/files.h"
 #include "apps/cli/options.h"
 #include "apps/cli/verb.h"
@@ -101,28 +102,16 @@ std::vector<fs::path> places_of(const io::CellReader& cells, const fs::path& to,
   return places;
 }
 
-/// A file that is open while its cells are read.
-struct Opened {
-  MappedFile file;
-  const io::Format& format;
-  io::CellReader cells;
-
-  explicit Opened(const fs::path& path)
-      : file(path),
-        format(io::format_of(path, file.text())),
-        cells(io::read_each(format, file.text(), escaped(path.string()))) {}
-};
-
 /// What is done with cell i of a file, by any thread.
 using Take = std::function<void(std::size_t i, Conversion&, io::Cell)>;
 
 /// The conversions of one file: one, or one for each of its cells.
 /// @param begin  is told the file before its first cell is taken
 std::vector<Conversion> convert_file(const fs::path& from, const Options& options,
-                                     const std::function<Take(const Opened&)>& begin) {
+                                     const std::function<Take(const OpenFile&)>& begin) {
   std::vector<Conversion> done;
   try {
-    const Opened opened(from);
+    const OpenFile opened(from);
     const Take take = begin(opened);
     done.resize(opened.cells.count);
     parallel_for(done.size(), 4, [&](std::size_t i) {
@@ -272,7 +261,7 @@ void run_together(const Options& options, const std::vector<fs::path>& files, co
   std::vector<std::vector<io::NamedMorphology>> read(files.size());
   console.progress().begin("converting", files.size());
   parallel_for(files.size(), 1, [&](std::size_t f) {
-    done[f] = convert_file(files[f], options, [&](const Opened& opened) -> Take {
+    done[f] = convert_file(files[f], options, [&](const OpenFile& opened) -> Take {
       const std::size_t count = opened.cells.count;
       read[f].resize(count);
       std::string stem = files.size() > 1 || count == 1 ? escaped(files[f].stem().string()) : "";
@@ -325,7 +314,7 @@ void run_apart(const Options& options, const std::vector<fs::path>& files, const
   const auto each = [&](const char* stage, const Put& put) {
     console.progress().begin(stage, files.size());
     parallel_for(files.size(), 1, [&](std::size_t f) {
-      done[f] = convert_file(files[f], options, [&](const Opened& opened) -> Take {
+      done[f] = convert_file(files[f], options, [&](const OpenFile& opened) -> Take {
         return [&, places = places_of(opened.cells, to[f], others)](std::size_t i, Conversion& conversion,
                                                                     io::Cell cell) {
           conversion.to = places[i];
@@ -360,7 +349,7 @@ void run_apart(const Options& options, const std::vector<fs::path>& files, const
 
 bool holds_several(const fs::path& path) {
   try {
-    return Opened(path).cells.count > 1;
+    return OpenFile(path).cells.count > 1;
   } catch (const InputError&) {  // told when its turn comes
     return false;
   }

@@ -14,6 +14,11 @@
 
 namespace forest::cli {
 
+OpenFile::OpenFile(const std::filesystem::path& path)
+    : file(path),
+      format(io::format_of(path, file.text())),
+      cells(io::read_each(format, file.text(), repository::escaped(path.string()))) {}
+
 FiledNeurons::FiledNeurons(std::vector<std::filesystem::path> files)
     : files_(std::move(files)), mapped_(files_.size()), cells_(files_.size()) {
   parallel_for(files_.size(), 1, [&](std::size_t f) {

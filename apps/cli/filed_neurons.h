@@ -17,6 +17,15 @@
 
 namespace forest::cli {
 
+/// A file that is open while its cells are read.
+struct OpenFile {
+  MappedFile file;
+  const io::Format& format;
+  io::CellReader cells;
+
+  explicit OpenFile(const std::filesystem::path& path);  // throws InputError
+};
+
 /// A file is one neuron, or as many as it holds (io/cells.h, HDF5, NeuroML, GENESIS); those of a file of cells are read when they are
 /// asked for.
 class FiledNeurons {

@@ -24,6 +24,7 @@
 #include "forest/repository/repository.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/filed_neurons.h"
 #include "apps/cli/files.h"
 #include "apps/cli/neurons.h"
 #include "apps/cli/oddities.h"
@@ -56,26 +57,21 @@ struct Arrival {
   std::size_t sections = 0, warnings = 0;
 };
 
-/// A file that is open while its cells are read.
-struct Opened {
-  MappedFile file;
-  std::string hash;
-  io::CellReader cells;
+/// With what it is known by.
+struct Hashed : OpenFile {
+  std::string hash = hash_hex(file.bytes());
 
-  explicit Opened(const fs::path& path)
-      : file(path),
-        hash(hash_hex(file.bytes())),
-        cells(io::read_each(io::format_of(path, file.text()), file.text(), escaped(path.string()))) {}
+  using OpenFile::OpenFile;
 };
 
 /// What is read at a time: a file, or some cells of one that holds more than fit into memory.
 struct Source {
   fs::path path;
-  std::shared_ptr<const Opened> opened;
+  std::shared_ptr<const Hashed> opened;
   std::size_t begin = 0, end = 0;
 };
 
-Arrival read(const fs::path& path, const Opened& opened, std::size_t i) {
+Arrival read(const fs::path& path, const Hashed& opened, std::size_t i) {
   io::Cell cell = opened.cells.read(i);
   Arrival arrival;
   arrival.path = path;
@@ -107,7 +103,7 @@ std::vector<Arrival> read(const Source& source, const Options& options) {
     }
   };
   guarded([&] {
-    const auto opened = source.opened ? source.opened : std::make_shared<const Opened>(source.path);
+    const auto opened = source.opened ? source.opened : std::make_shared<const Hashed>(source.path);
     for (std::size_t i = source.begin, end = source.opened ? source.end : opened->cells.count; i < end; ++i)
       guarded([&] { arrivals.push_back(read(source.path, *opened, i)); });
   });
@@ -120,7 +116,7 @@ std::vector<Source> sources_of(const std::vector<fs::path>& paths) {
   std::vector<Source> sources;
   for (const fs::path& path : paths) {
     try {
-      const auto opened = is_cells_file(path) ? std::make_shared<const Opened>(path) : nullptr;
+      const auto opened = is_cells_file(path) ? std::make_shared<const Hashed>(path) : nullptr;
       if (!opened) sources.push_back({path, nullptr});
       for (std::size_t i = 0; opened && i < opened->cells.count; i += piece)
         sources.push_back({path, opened, i, std::min(i + piece, opened->cells.count)});
