@@ -5,7 +5,6 @@
 #include <array>
 #include <cctype>
 #include <cmath>
-#include <map>
 #include <numeric>
 #include <regex>
 
@@ -53,10 +52,14 @@ std::string quoted(std::string_view text) {
 
 class Resolver {
  public:
-  Resolver(const NodeSets& sets, const NodeTable& table) : sets_(sets), table_(table) {}
+  Resolver(const NodeSets& sets, const NodeTable& table, KnownSets& known)
+      : sets_(sets), table_(table), known_(known) {}
 
-  const Members& of(std::string_view name) {
-    if (const auto known = done_.find(name); known != done_.end()) return known->second;
+  const KnownSet& of(std::string_view name) {
+    // One that is too deep here is gone down into all the same, to say where.
+    if (const auto known = known_.find(name);
+        known != known_.end() && path_.size() + known->second.depth <= deepest)
+      return known->second;
     const NodeSet* set = sets_.find(name);
     if (!set)
       refuse(path_.empty()
@@ -73,26 +76,25 @@ class Resolver {
       refuse(fmt::format("more than {} node sets stand within one another, down to {}; name fewer", deepest,
                          quoted(name)));
     path_.push_back(name);
-    Members result;
-    if (set->compound)
-      result = of_others(*set);
-    else
-      result = of_clauses(*set);
+    KnownSet result = set->compound ? of_others(*set) : KnownSet{of_clauses(*set)};
     path_.pop_back();
-    return done_.emplace(set->name, std::move(result)).first->second;
+    return known_.emplace(set->name, std::move(result)).first->second;
   }
 
  private:
   [[noreturn]] void refuse(const std::string& sentence) const { throw InputError(sets_.source, 0, sentence); }
 
-  Members of_others(const NodeSet& set) {
-    Members result;
+  KnownSet of_others(const NodeSet& set) {
+    KnownSet result;
+    Members& nodes = result.members;
     for (const std::string& other : set.of) {
-      const Members& more = of(other);
-      result.insert(result.end(), more.begin(), more.end());
-      if (result.size() > 2 * table_.count) result = distinct(std::move(result));
+      const KnownSet& more = of(other);
+      result.depth = std::max(result.depth, more.depth + 1);
+      nodes.insert(nodes.end(), more.members.begin(), more.members.end());
+      if (nodes.size() > 2 * table_.count) nodes = distinct(std::move(nodes));
     }
-    return distinct(std::move(result));
+    nodes = distinct(std::move(nodes));
+    return result;
   }
 
   Members of_clauses(const NodeSet& set) const {
@@ -164,7 +166,7 @@ class Resolver {
 
   const NodeSets& sets_;
   const NodeTable& table_;
-  std::map<std::string, Members, std::less<>> done_;
+  KnownSets& known_;
   std::vector<std::string_view> path_;
 };
 
@@ -315,7 +317,13 @@ bool NodeSets::remove(std::string_view name) {
 }
 
 Members members(const NodeSets& sets, std::string_view name, const NodeTable& table) {
-  return Resolver(sets, table).of(name);
+  KnownSets known;
+  return members(sets, name, table, known);
+}
+
+const Members& members(const NodeSets& sets, std::string_view name, const NodeTable& table,
+                       KnownSets& known) {
+  return Resolver(sets, table, known).of(name).members;
 }
 
 Members evaluate(std::string_view expression, const std::function<Members(const std::string&)>& find,

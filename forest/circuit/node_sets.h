@@ -68,10 +68,19 @@ struct NodeTable {
   std::string known;                                                    // their names, for errors
 };
 
+/// Sets whose nodes are known, by their names: of the same sets and the same table.
+struct KnownSet {
+  Members members;
+  std::size_t depth = 1;  // sets within one another in it
+};
+using KnownSets = std::map<std::string, KnownSet, std::less<>>;
+
 /// The nodes of a set. A word and a number are equal when they read the same: the layer "2" is 2.
 /// Throws InputError (the source, one sentence): no such set, a circle of sets or 64 within one another, an attribute that
 /// the table lacks, a comparison of words or a pattern for numbers, a pattern that is none.
 Members members(const NodeSets& sets, std::string_view name, const NodeTable& table);
+/// The same for who asks for many: a set that is `known` is not looked for again, and what is met on the way is kept there.
+const Members& members(const NodeSets& sets, std::string_view name, const NodeTable& table, KnownSets& known);
 
 /// Runs of nodes that follow one another, as SONATA numbers them in their population.
 struct NodeRun {

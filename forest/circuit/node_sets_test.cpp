@@ -108,6 +108,40 @@ TEST(NodeSets, MayBeManyAndAreAddedAndTakenOut) {
   EXPECT_EQ(sets.find("4"), &sets.sets[3]);
 }
 
+TEST(NodeSets, ThatManyShareAreLookedAtOnce) {
+  constexpr std::size_t many = 3000;
+  NodeSets sets;
+  NodeSet shared{.name = "shared", .clauses = {}, .of = {}, .compound = true};
+  for (std::size_t i = 0; i < many; ++i) {
+    const std::string name = std::to_string(i);
+    sets.put({.name = name, .clauses = {{"node_id", Ask::any_of, {}, {double(i % 6)}}}, .of = {}});
+    sets.put({.name = "with " + name, .clauses = {}, .of = {name, "shared"}, .compound = true});
+    shared.of.push_back(name);
+  }
+  sets.put(shared);
+  std::size_t asked = 0;
+  NodeTable table = six();
+  table.attribute = [&asked, known = table.attribute](std::string_view name) { return ++asked, known(name); };
+  KnownSets known;
+  for (const NodeSet& set : sets.sets)
+    EXPECT_EQ(members(sets, set.name, table, known).size(), set.compound ? 6u : 1u) << set.name;
+  EXPECT_EQ(asked, many);
+}
+
+TEST(NodeSets, TooDeepIsTheSameInWhateverOrderTheyAreAskedFor) {
+  NodeSets sets;
+  sets.put({.name = "0", .clauses = {}, .of = {}});
+  for (int i = 1; i < 66; ++i)
+    sets.put({.name = std::to_string(i), .clauses = {}, .of = {std::to_string(i - 1)}, .compound = true});
+  KnownSets known;
+  for (int i = 0; i < 64; ++i) EXPECT_EQ(members(sets, std::to_string(i), six(), known).size(), 6u) << i;
+  for (const char* deep : {"64", "65"}) {
+    const std::string alone = refused(sets, deep);
+    EXPECT_THAT(alone, HasSubstr("within one another"));
+    EXPECT_EQ(forest::refused<InputError>([&] { members(sets, deep, six(), known); }), alone);
+  }
+}
+
 TEST(NodeSets, HostileOnesEndWithASentence) {
   NodeSets sets;
   for (int i = 0; i < 5000; ++i)  // a chain

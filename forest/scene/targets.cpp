@@ -143,20 +143,20 @@ circuit::NodeTable node_table(const Forest& forest) {
 }
 
 Targets::Targets(Forest forest, circuit::NodeSets sets)
-    : forest_(std::move(forest)), sets_(std::move(sets)) {}
+    : forest_(std::move(forest)), table_(node_table(forest_)), sets_(std::move(sets)) {}
 
 void Targets::use(circuit::NodeSets sets) {
   sets_ = std::move(sets);
-  known_.clear();
+  known_sets_.clear(), known_.clear();
 }
 
 const Members& Targets::find(const std::string& expression) const {
-  if (const auto found = known_.find(expression); found != known_.end()) return found->second;
   // A name that is there as it stands, whatever words are in it, is no expression.
-  const bool is_set = sets_.find(expression) != nullptr;
-  const bool is_name = is_set || std::ranges::any_of(families, [&](const Family& family) {
-                         return has_word(attribute_of(forest_, family.attribute), expression);
-                       });
+  if (sets_.find(expression)) return circuit::members(sets_, expression, table_, known_sets_);
+  if (const auto found = known_.find(expression); found != known_.end()) return found->second;
+  const bool is_name = std::ranges::any_of(families, [&](const Family& family) {
+    return has_word(attribute_of(forest_, family.attribute), expression);
+  });
   Members members = is_name ? named(expression)
                             : circuit::evaluate(
                                   expression, [this](const std::string& name) { return named(name); },
@@ -165,8 +165,8 @@ const Members& Targets::find(const std::string& expression) const {
 }
 
 Members Targets::named(const std::string& name) const {
-  if (sets_.find(name)) return circuit::members(sets_, name, node_table(forest_));
-  if (name.starts_with("set:")) return circuit::members(sets_, name.substr(4), node_table(forest_));
+  if (sets_.find(name)) return circuit::members(sets_, name, table_, known_sets_);
+  if (name.starts_with("set:")) return circuit::members(sets_, name.substr(4), table_, known_sets_);
   if (name == "all" || name == "all:all") {
     Members all(forest_.instances().size());
     std::iota(all.begin(), all.end(), 0u);

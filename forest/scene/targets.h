@@ -45,8 +45,10 @@ class Targets {
   std::string some_names() const;
 
   Forest forest_;
+  circuit::NodeTable table_;
   circuit::NodeSets sets_;
-  mutable std::map<std::string, circuit::Members> known_;
+  mutable circuit::KnownSets known_sets_;
+  mutable std::map<std::string, circuit::Members> known_;  // expressions
 };
 
 }  // namespace forest::scene
