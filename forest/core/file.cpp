@@ -48,6 +48,11 @@ int open_nameless(const std::filesystem::path& folder) {
   return ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
 }
 
+/// Gives a file another name, unless that is taken. Names of open files are followed.
+bool link_to(const std::filesystem::path& file, const std::filesystem::path& name) {
+  return ::linkat(AT_FDCWD, file.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0;
+}
+
 /// The number of an open file of this program when the path is a name of one (/dev/stdout, /dev/fd/3), or -1.
 int open_file_at(const std::filesystem::path& place) {
   const std::string text = place.string();
@@ -145,6 +150,7 @@ NewFile::NewFile(const std::filesystem::path& wanted) : wanted_(wanted), place_(
     file_ = ::mkostemp(part.data(), O_CLOEXEC);
     if (file_ < 0) fail("created");
     part_ = part;
+    unfinished_.emplace(part_);
   }
   ::fchmod(file_, there && !stream_ ? status.st_mode & 0777 : permissions(0666));
 }
@@ -162,8 +168,9 @@ void NewFile::give_name() {
   for (std::random_device chance;;) {
     const auto part =
         fmt::format("{}.{:06x}", (stream_ ? folder_ / "brainforest" : place_).string(), chance() & 0xffffff);
-    if (::linkat(AT_FDCWD, own_name().c_str(), AT_FDCWD, part.c_str(), AT_SYMLINK_FOLLOW) == 0) {
+    if (link_to(own_name(), part)) {
       part_ = part;
+      unfinished_.emplace(part_);
       return;
     }
     if (errno != EEXIST) fail("created");
@@ -195,6 +202,10 @@ void NewFile::overwrite(std::uint64_t at, std::span<const std::byte> bytes) {
   if (!stream_ && count >= piece) send(file_, begin, count);
 }
 
+void NewFile::sync() {
+  if (::fsync(file_) != 0 && errno != EINVAL) fail("written");
+}
+
 void NewFile::commit() {
   if (stream_) {
     const MappedFile whole(part_.empty() ? std::filesystem::path(own_name()) : part_);
@@ -209,14 +220,23 @@ void NewFile::commit() {
     if (!written || !closed) fail("written");
     return;
   }
-  if (::fsync(file_) != 0 && errno != EINVAL) fail("written");
+  sync();
   // Where nothing is to be replaced the file gets its name at once, else by way of a passing one.
-  if (part_.empty() &&
-      ::linkat(AT_FDCWD, own_name().c_str(), AT_FDCWD, place_.c_str(), AT_SYMLINK_FOLLOW) == 0)
-    return;
-  give_name();
-  if (::rename(part_.c_str(), place_.c_str()) != 0) fail("renamed");
-  part_.clear();
+  if (part_.empty() && link_to(own_name(), place_)) return;
+  if (::rename(path().c_str(), place_.c_str()) != 0) fail("renamed");
+  part_.clear(), unfinished_.reset();
+}
+
+bool NewFile::commit_new() {
+  sync();
+  if (link_to(part_.empty() ? own_name() : part_.string(), place_)) return true;
+  const bool no_links = errno == EPERM || errno == EOPNOTSUPP || errno == ENOSYS;  // in this file system
+  if (no_links && ::renameat2(AT_FDCWD, path().c_str(), AT_FDCWD, place_.c_str(), RENAME_NOREPLACE) == 0) {
+    part_.clear(), unfinished_.reset();
+    return true;
+  }
+  if (errno != EEXIST) fail("renamed");
+  return false;
 }
 
 void NewFile::fail(const char* what) const {

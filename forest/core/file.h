@@ -5,8 +5,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string_view>
+
+#include "forest/core/unfinished.h"
 
 namespace forest {
 
@@ -29,11 +32,13 @@ class MappedFile {
 /// Whether some NewFile was for standard output (/dev/stdout): what a person reads belongs elsewhere then.
 bool standard_output_taken();
 
-/// A file on its way: written without a name on the disk of its place, put there by commit(), so that a killed program
-/// leaves the old file or the new one, and nothing else. (Where the file system knows no files without names, and after
-/// path(), it has a passing name beside its place until then, which a kill leaves behind.) Links are followed: what they
-/// point to is replaced, they stay. Where no file can lie (a pipe, a terminal, /dev/null, /dev/stdout) commit() sends the
-/// bytes into what is there.
+/// A file on its way: written without a name on the disk of its place, put there by commit() once the disk has it, so that
+/// a killed program, or a computer without power, leaves the old file or the new one, and nothing else. (Where the file system
+/// knows no files without names, and after path(), it has a passing name beside its place until then, which an interruption
+/// takes away and SIGKILL leaves behind.) Links are followed: what they point to is replaced, they stay. Where no file can lie
+/// (a pipe, a terminal, /dev/null, /dev/stdout) commit() sends the bytes into what is there.
+///
+/// This is the one way to a whole file. What is made over hours goes on in a PartFile; a folder is an io::NewFolder.
 class NewFile {
  public:
   /// Throws Error when the folder is missing or cannot be written.
@@ -48,15 +53,19 @@ class NewFile {
   /// Writes over what is there, or beyond, by any thread; the next write() still goes behind the last.
   void overwrite(std::uint64_t at, std::span<const std::byte> bytes);
   void commit();
+  /// Only where there is none: of several programs the first wins. Returns whether it did.
+  bool commit_new();
 
  private:
   friend class ScratchFile;
   [[noreturn]] void fail(const char* what) const;
   std::string own_name() const;
   void give_name();
+  void sync();
 
   std::filesystem::path wanted_, place_, folder_, part_;
-  bool stream_ = false;  // the place takes bytes, not a file
+  std::optional<Unfinished> unfinished_;  // as long as it has a passing name, part_
+  bool stream_ = false;                   // the place takes bytes, not a file
   int file_ = -1;
 };
 

@@ -2,6 +2,8 @@
 #include "forest/core/file.h"
 
 #include <algorithm>
+#include <csignal>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -10,6 +12,7 @@
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 
 #include "forest/core/error.h"
 #include "forest/core/hash.h"
@@ -141,6 +144,36 @@ TEST_F(FileInAFolder, ALibraryThatAsksForANameGetsOne) {
     EXPECT_TRUE(std::filesystem::exists(file.path()));
   }
   EXPECT_EQ(entries(folder_), 1);
+}
+
+TEST_F(FileInAFolder, AnInterruptionTakesThePassingNameAway) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    NewFile file(folder_ / "film");
+    std::ofstream(file.path()) << "half";
+    ::kill(::getpid(), SIGINT);
+    ::sleep(20);
+    std::_Exit(7);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGINT);
+  EXPECT_EQ(entries(folder_), 0);
+}
+
+TEST_F(FileInAFolder, OfTwoThatMayReplaceNothingTheFirstWins) {
+  for (const bool named : {false, true}) {
+    const auto place = folder_ / (named ? "named" : "nameless");
+    {
+      NewFile first(place), second(place);
+      first.write(std::as_bytes(std::span("first", 5)));
+      if (named) (void)first.path(), (void)second.path();
+      EXPECT_TRUE(first.commit_new());
+      EXPECT_FALSE(second.commit_new());
+    }
+    EXPECT_EQ(MappedFile(place).text(), "first");
+  }
+  EXPECT_EQ(entries(folder_), 2);
 }
 
 // Who writes "-" means standard output, and would find a file of that name instead.

@@ -6,9 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
-#include <cstring>
 #include <fcntl.h>
-#include <fstream>
 #include <span>
 #include <thread>
 #include <unistd.h>
@@ -79,45 +77,44 @@ double age(const fs::path& path) {
                : std::abs(std::chrono::duration<double>(fs::file_time_type::clock::now() - time).count());
 }
 
-/// A download on its way into its .part file.
+/// A download on its way into its part.
 class Part {
  public:
-  Part(const fs::path& path, const std::string& address, std::size_t max_bytes)
-      : path_(path), address_(address), max_bytes_(max_bytes) {
+  Part(const fs::path& place, const std::string& address, std::size_t max_bytes)
+      : file_(place), address_(address), max_bytes_(max_bytes) {
     // Only what can be compared byte by byte can be continued (RFC 9110, section 13.1.5): not a weak ETag.
-    if (const auto kept = read(path, address)) {
+    if (const auto kept = read(file_.path(), address)) {
       validator_ = !kept->etag.empty() ? kept->etag : kept->modified;
       size_ = kept->bytes.size();
       if (validator_.empty() || validator_.starts_with("W/")) size_ = 0;
     }
   }
 
+  ~Part() {
+    if (file_.size() == 0) forget();
+  }
+  Part(const Part&) = delete;
+  Part& operator=(const Part&) = delete;
+
   std::uint64_t size() const { return size_; }
   const std::string& validator() const { return validator_; }
-  const fs::path& path() const { return path_; }
 
   /// False when it is another part than the one that was asked for; then all begins again.
   bool take(const Head& head, std::span<const std::byte> bytes) {
-    if (!file_.is_open() && !begin(head)) return false;
+    if (!begun_ && !(begun_ = begin(head))) return false;
     if (size_ + bytes.size() > max_bytes_) refuse();
-    file_.write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
-    if (!file_.flush()) fail();  // at once, so that it is there when the program is killed
+    file_.write(bytes);  // at once, so that it is there when the program is killed
     size_ += bytes.size();
     return true;
   }
   bool misled() const { return misled_; }
 
   /// The bytes so far, which leave the disk when `forget` is called.
-  std::string bytes() {
-    file_.close();
-    const auto kept = read(path_, address_);
+  std::string bytes() const {
+    const auto kept = read(file_.path(), address_);
     return kept ? kept->bytes : "";
   }
-  void forget() {
-    file_.close();
-    std::error_code none;
-    fs::remove(path_, none);
-  }
+  void forget() { file_.discard(); }
 
  private:
   bool begin(const Head& head) {
@@ -127,10 +124,10 @@ class Part {
       forget();
       return false;
     }
-    file_.open(path_, std::ios::binary | (head.status == 206 ? std::ios::app : std::ios::trunc));
     if (head.status == 206) return true;
     size_ = 0;
-    if (!(file_ << first_line(address_, head.etag, head.modified))) fail();
+    file_.cut(0);
+    file_.write(bytes_of(first_line(address_, head.etag, head.modified)));
     return true;
   }
   [[noreturn]] void refuse() {
@@ -138,19 +135,13 @@ class Part {
     throw LimitError(
         fmt::format("{}: is larger than {} bytes; raise --max-size if it is right", address_, max_bytes_));
   }
-  [[noreturn]] void fail() const {
-    throw Error(
-        fmt::format("{}: cannot be written ({}); check that the folder can be written and the disk has room",
-                    path_.string(), std::strerror(errno)));
-  }
 
-  fs::path path_;
+  PartFile file_;
   const std::string& address_;
   std::size_t max_bytes_;
   std::string validator_;
   std::uint64_t size_ = 0;
-  bool misled_ = false;
-  std::ofstream file_;
+  bool begun_ = false, misled_ = false;
 };
 
 /// Others who use the folder wait while this exists.
@@ -237,7 +228,7 @@ Cache::Entry Cache::download(const std::string& address, const fs::path& place, 
   const auto kept = read_entry(place, address);
   const Patience& patience = options_.patience;
   for (unsigned attempt = 1;; ++attempt) {
-    Part part(fs::path(place) += ".part", address, max_bytes);
+    Part part(place, address, max_bytes);
     Request request{.address = address, .from = part.size()};
     if (request.from)
       request.if_range = part.validator();

@@ -3,9 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstring>
-#include <fcntl.h>
 #include <filesystem>
 #include <new>
 #include <type_traits>
@@ -359,14 +356,6 @@ std::vector<std::string> Sqlite::each(const std::string& question, const Take& t
   return names;
 }
 
-/// Gives the file `part` the name `path` unless there is such a file; returns 0 or the error's number.
-int name_file(const std::string& part, const std::string& path) {
-  if (::link(part.c_str(), path.c_str()) == 0) return 0;
-  if (errno != EPERM && errno != EOPNOTSUPP && errno != ENOSYS)
-    return errno;  // else a file system without links
-  return ::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, path.c_str(), RENAME_NOREPLACE) == 0 ? 0 : errno;
-}
-
 /// Makes a repository without neurons at `path`. It is filled under another name and then linked into place,
 /// so that a killed program leaves no half of it and the first of two programs wins.
 void create(const std::string& path) {
@@ -384,11 +373,7 @@ void create(const std::string& path) {
     sql << "commit";
     database
         .begin_writing();  // whoever finds the file now waits, and none believes the journal of an earlier one to be its own
-    const int failed = name_file(part, path);
-    if (failed && failed != EEXIST)
-      throw InputError(
-          path, 0, fmt::format("cannot be made ({}); check the folder's permissions", std::strerror(failed)));
-    if (!failed) ::unlink((path + "-journal").c_str());
+    if (file.commit_new()) ::unlink((path + "-journal").c_str());
     sql << "rollback";
   } catch (...) {
     ::unlink((part + "-journal").c_str());
