@@ -13,6 +13,7 @@
 #include "forest/core/number.h"
 #include "forest/io/plain_text.h"
 #include "forest/io/surface.h"
+#include "forest/io/words.h"
 
 namespace forest::io {
 namespace {
@@ -26,15 +27,11 @@ class Reader {
   template <class Number>
   std::vector<Number> numbers(std::string_view text, std::string_view what) const {
     std::vector<Number> result;
-    constexpr std::string_view blanks = " \t\r\n";
-    for (std::size_t at = text.find_first_not_of(blanks); at != text.npos;) {
-      const std::size_t end = std::min(text.find_first_of(blanks, at), text.size());
-      const std::string_view word = text.substr(at, end - at);
+    for (const std::string_view word : words_of(text)) {
       const auto value = number_of<Number>(word);
       if (!value)
         refuse(fmt::format("{} hold '{}', which is no number; get the whole file", what, printable(word)));
       result.push_back(*value);
-      at = text.find_first_not_of(blanks, end);
     }
     return result;
   }

@@ -140,16 +140,6 @@ std::optional<Option> option_of(std::string_view word) {
   return row == options.end() ? std::nullopt : std::optional(row->second);
 }
 
-std::vector<std::string_view> words_of(std::string_view text) {
-  std::vector<std::string_view> words;
-  for (std::size_t begin = text.find_first_not_of(blanks); begin != text.npos;) {
-    const std::size_t end = std::min(text.find_first_of(blanks, begin), text.size());
-    words.push_back(text.substr(begin, end - begin));
-    begin = text.find_first_not_of(blanks, end);
-  }
-  return words;
-}
-
 struct Compartment {
   std::int32_t parent = -1;
   std::size_t line = 0;

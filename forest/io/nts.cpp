@@ -106,12 +106,8 @@ bool is_code(std::string_view text) {
 std::optional<Record> record_of(std::string_view line) {
   Record r;
   std::array<std::string_view, 7> tokens;
-  std::size_t count = 0, at = line.find_first_not_of(blanks), end = at;
-  for (; count < tokens.size() && at != line.npos; ++count) {
-    end = std::min(line.find_first_of(blanks, at), line.size());
-    tokens[count] = line.substr(at, end - at);
-    at = line.find_first_not_of(blanks, end);
-  }
+  std::string_view rest = line;
+  for (std::string_view& token : tokens) token = next_word(rest);
   const auto reads = [&](const std::array<std::string_view, 7>& fields) {
     bool good =
         parse(fields[0], r.number) && is_code(fields[1]) && (fields[2].empty() || parse(fields[2], r.tag));
@@ -124,9 +120,9 @@ std::optional<Record> record_of(std::string_view line) {
   std::array<std::string_view, 7> fields;
   for (std::size_t i = 0; i < fields.size(); ++i)
     fields[i] = field(line, columns[i].first, columns[i].second);
-  if (count == tokens.size() && reads(tokens)) {
+  if (!tokens.back().empty() && reads(tokens)) {
     r.by_blanks = fields != tokens;
-    r.rest = trimmed(line.substr(end));
+    r.rest = trimmed(rest);
     return r;
   }
   if (!reads(fields)) return std::nullopt;

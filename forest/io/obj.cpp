@@ -6,8 +6,9 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
-#include "forest/io/mesh_words.h"
+#include "forest/core/number.h"
 #include "forest/io/surface.h"
+#include "forest/io/words.h"
 
 namespace forest::io {
 namespace {
@@ -68,12 +69,12 @@ class Numbers {
 
   template <class Number>
   Number next(const char* of) {
-    while (line_.find_first_not_of(between_words) == std::string_view::npos) {
+    std::string_view word;
+    while ((word = next_word(line_)).empty()) {
       if (text_.empty())
         throw InputError(name_, line_number_, fmt::format("ends within its {}; get the whole file", of));
       line_ = next_line(text_), ++line_number_;
     }
-    const std::string_view word = next_word(line_);
     const auto value = number_of<Number>(word);
     if (!value)
       throw InputError(name_, line_number_,

@@ -12,8 +12,9 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
-#include "forest/io/mesh_words.h"
+#include "forest/core/number.h"
 #include "forest/io/surface.h"
+#include "forest/io/words.h"
 
 namespace forest::io {
 namespace {
@@ -107,12 +108,12 @@ class Values {
 
   double next(const Type& type) {
     if (order_ == Order::text) {
-      while (line_.find_first_not_of(between_words) == line_.npos) {
+      std::string_view word;
+      while ((word = next_word(line_)).empty()) {
         if (bytes_.empty())
           throw InputError(name_, line_number_, "ends before its last value; get the whole file");
         line_ = next_line(bytes_), ++line_number_;
       }
-      const std::string_view word = next_word(line_);
       const auto value = number_of<double>(word);
       if (!value)
         throw InputError(name_, line_number_,

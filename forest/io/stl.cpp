@@ -10,8 +10,9 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
-#include "forest/io/mesh_words.h"
+#include "forest/core/number.h"
 #include "forest/io/surface.h"
+#include "forest/io/words.h"
 
 namespace forest::io {
 namespace {

@@ -17,7 +17,6 @@
 #include "forest/io/freesurfer.h"
 #include "forest/io/gifti.h"
 #include "forest/io/inflate.h"
-#include "forest/io/mesh_words.h"
 #include "forest/io/obj.h"
 #include "forest/io/plain_text.h"
 #include "forest/io/ply.h"

@@ -332,13 +332,8 @@ class Scanner {
   /// decimal points.
   std::vector<std::string> split(std::string_view data) {
     const auto at = [&](std::string_view separators) {
-      std::vector<std::string> tokens;
-      for (std::size_t begin = data.find_first_not_of(separators); begin != data.npos;) {
-        const std::size_t end = std::min(data.find_first_of(separators, begin), data.size());
-        tokens.emplace_back(data.substr(begin, end - begin));
-        begin = data.find_first_not_of(separators, end);
-      }
-      return tokens;
+      const auto words = words_of(data, separators);
+      return std::vector<std::string>(words.begin(), words.end());
     };
     const bool semicolons = data.find(';') != data.npos;
     if (semicolons) oddities_.add(SwcOddity::commas, line_, "columns are separated by semicolons");

@@ -7,11 +7,13 @@
 #include <cstddef>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace forest::io {
 
-constexpr std::string_view blanks = " \t\v\f";      // within a line
-constexpr std::string_view xml_blanks = " \t\r\n";  // XML 1.0, section 2.3
+constexpr std::string_view blanks = " \t\v\f";             // within a line
+constexpr std::string_view between_words = " \t\v\f\r\n";  // within a text
+constexpr std::string_view xml_blanks = " \t\r\n";         // XML 1.0, section 2.3
 
 /// Calls `visit(line, number)` for each line, ended as on any system; stops where it returns false.
 template <class Visit>
@@ -21,6 +23,29 @@ void each_line(std::string_view text, Visit visit) {
     if (!visit(text.substr(begin, end - begin), number)) return;
     begin = end + (text.substr(end, 2) == "\r\n" ? 2 : 1);
   }
+}
+
+/// The next line of a text, which loses it with its end, a line feed.
+inline std::string_view next_line(std::string_view& text) {
+  const std::string_view line = text.substr(0, text.find('\n'));
+  text.remove_prefix(std::min(line.size() + 1, text.size()));
+  return line;
+}
+
+/// The next word of a text, which loses it; empty at its end.
+inline std::string_view next_word(std::string_view& text, std::string_view between = between_words) {
+  text.remove_prefix(std::min(text.find_first_not_of(between), text.size()));
+  const std::string_view word = text.substr(0, text.find_first_of(between));
+  text.remove_prefix(word.size());
+  return word;
+}
+
+inline std::vector<std::string_view> words_of(std::string_view text,
+                                              std::string_view between = between_words) {
+  std::vector<std::string_view> words;
+  for (auto word = next_word(text, between); !word.empty(); word = next_word(text, between))
+    words.push_back(word);
+  return words;
 }
 
 /// Whether a text is a word that is given in small letters; its own may be either.
