@@ -3,9 +3,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -14,10 +12,10 @@
 
 #include "forest/core/byte_order_mark.h"
 #include "forest/core/error.h"
-#include "forest/core/lower.h"
+#include "forest/io/asc_own.h"
+#include "forest/io/asc_text.h"
 #include "forest/io/asc_words.h"
 #include "forest/io/numbers.h"
-#include "forest/io/oddity.h"
 #include "forest/io/own_file.h"
 #include "forest/io/placed_words.h"
 #include "forest/io/plain_text.h"
@@ -27,39 +25,6 @@
 
 namespace forest::io {
 namespace {
-
-enum class AscOddity : std::uint8_t {
-  byte_order_mark,
-  padding,
-  thumbnail,
-  several_outlines,
-  outline_by_name,
-  small_outline,
-  empty_outline,
-  no_type,
-  type_in_branch,
-  no_diameter,
-  negative_diameter,
-  unknown_diameter,
-  unknown_place,
-  extra_numbers,
-  empty_tree,
-  tree_begins_with_split,
-  branch_without_points,
-  only_branch_point,
-  empty_branch,
-  single_daughter,
-  second_split,
-  unknown_word,
-  text_in_tree,
-  trailing_text,
-  spine_without_place,
-  spine_before_points,
-  stray_bracket,
-  comments_not_kept,
-  properties_not_kept,
-  count
-};
 
 constexpr std::string_view several_cells =
     "nothing, if they are outlines of one soma; split the file if it holds several cells";
@@ -103,19 +68,8 @@ constexpr std::array<Oddity, static_cast<std::size_t>(AscOddity::count)> table{{
     {"properties-not-kept", false, "they are skipped", keep_original, true},
 }};
 
-constexpr std::string_view layout = "a point is (x y z diameter)";
 constexpr std::array<std::string_view, 7> leaf_words{"Normal",    "High",   "Low",     "Incomplete",
                                                      "Generated", "Origin", "Midpoint"};
-// Properties of outlines and trees in which numbers follow the word.
-constexpr std::array<std::string_view, 6> numbered_words{"ZSmear", "Class",      "Font",
-                                                         "Color",  "Resolution", "SSM"};
-
-bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
-bool begins_number(char c) { return is_digit(c) || c == '-' || c == '+' || c == '.'; }
-bool ends_word(char c) {
-  return static_cast<unsigned char>(c) <= ' ' || c == ')' || c == '(' || c == ';' || c == '|' || c == '<' ||
-         c == '>' || c == '"';
-}
 
 std::optional<SectionKind> type_of(std::string_view word) {
   if (same_word(word, "axon")) return SectionKind::axon;
@@ -143,13 +97,11 @@ class Lost {
   std::string first_;
 };
 
-class Reader {
+class Reader final : private AscText {
  public:
   Reader(std::string_view bytes, const std::string& name) : Reader(plain_text(bytes, name), name) {}
 
   void read() {
-    p_ = text_.data();
-    end_ = p_ + text_.size();  // there a zero ends every loop
     for (;;) {
       inside_ = false;
       const char c = next();
@@ -191,41 +143,25 @@ class Reader {
 
  private:
   Reader(const PlainText& plain, const std::string& name)
-      : text_(plain.text), name_(name), oddities_(table), sections_(builder_, text_.find('<') != text_.npos) {
+      : AscText(plain.text, name, table), sections_(builder_, text_.find('<') != text_.npos) {
     if (plain.byte_order_mark)
       oddities_.add(AscOddity::byte_order_mark, 1, "the file begins with a byte order mark");
     if (plain.padding) oddities_.add(AscOddity::padding, 0, "zero bytes or Ctrl-Z stand at the end");
   }
 
-  // Characters ---------------------------------------------------------------------------------------------
+  // Comments -----------------------------------------------------------------------------------------------
 
-  /// Goes to the next character that is neither blank nor in a comment.
-  char next() {
-    for (;; ++p_) {
-      const char c = *p_;
-      if (c == ' ' || c == '\t') continue;
-      if (c == '\n') {
-        ++line_;
-      } else if (c == '\r') {
-        line_ += p_[1] != '\n';
-      } else if (c == ';') {
-        comment();
-        --p_;
-      } else {
-        return c;
-      }
-    }
-  }
-
-  void comment() {
-    const char* const begin = p_;
-    while (!is_line_end(*p_) && p_ < end_) ++p_;
-    if (inside_ && !to_the_letter_) return lose_comment(asc_comment({begin, p_}));
-    const char* before = begin;
+  void comment(std::string_view text) override {
+    const std::string_view said = asc_comment(text);
+    if (inside_ && !to_the_letter_) return lose_comment(said);
+    const char* before = text.data();
     while (before > text_.data() && is_blank(before[-1])) --before;
-    const std::string_view said = asc_comment({begin, p_});
     if (inside_) {
-      if (said.starts_with(asc_own_prefix)) own_comment(said);
+      if (said.starts_with(asc_own_prefix) &&
+          !said_.take(said, std::max(own_.points.size(), soma_.points.size())))
+        throw InputError(name_, line_,
+                         fmt::format("the comment {} does not hold the numbers it should; remove the line",
+                                     shown(said.substr(0, said.find(' ')))));
     } else if (const OwnFile own = own_file(said, asc_marker); line_ == 1 && own.ours) {
       to_the_letter_ = true, without_points_ = own.without_points;
     } else if (const bool whole_line = before == text_.data() || is_line_end(before[-1]); !whole_line) {
@@ -242,166 +178,7 @@ class Reader {
     if (!numbering && text != "Root" && !text.starts_with("End of ")) lost_comments_.add(line_, text);
   }
 
-  /// The run of characters that begins here, one at least; stays in front of it.
-  std::string_view word() const {
-    const char* q = p_;
-    do ++q;
-    while (q < end_ && !ends_word(*q));
-    return {p_, std::min(q, end_)};
-  }
-
-  /// From a quotation mark to behind the next one.
-  std::string_view quoted() {
-    const char* const begin = ++p_;
-    const std::size_t line = line_;
-    for (; *p_ != '"'; ++p_) {
-      if (p_ == end_)
-        throw InputError(name_, line, "a quotation mark is not closed; close it, or get the whole file");
-      line_ += *p_ == '\n' || (*p_ == '\r' && p_[1] != '\n');
-    }
-    return {begin, p_++};
-  }
-
-  [[noreturn]] void unfinished(std::string_view what, std::size_t begin) const {
-    throw InputError(
-        name_, line_,
-        fmt::format("the file ends inside of {} that begins on line {}; get the whole file, or close "
-                    "its brackets",
-                    what, begin));
-  }
-
-  [[noreturn]] void unexpected(std::string_view where) const {
-    throw InputError(
-        name_, line_,
-        fmt::format("\"{}\" has no meaning in {}; remove it or put it into brackets", shown(word()), where));
-  }
-
-  // Points -------------------------------------------------------------------------------------------------
-
-  /// From the first number to behind the closing bracket.
-  Point point() {
-    std::array<float, 4> v{};
-    std::size_t count = 0;
-    bool exponent = false;
-    while (count < 4 && read_real<ends_word>(p_, v[count], exponent)) {
-      ++count;
-      if (next() == ')') break;
-    }
-    if (count == 4 && *p_ == ')') [[likely]]
-      ++p_;
-    else
-      odd_point(v, count);
-    const float sum = v[0] + v[1] + v[2];
-    if (!(std::abs(sum) < std::numeric_limits<float>::infinity()) || !(v[3] >= 0.f) ||
-        !(v[3] < std::numeric_limits<float>::infinity())) [[unlikely]]
-      unknown_numbers(v);
-    return {v[0], v[1], v[2], .5f * v[3]};
-  }
-
-  void odd_point(std::array<float, 4>& v, std::size_t count) {
-    for (;;) {
-      const char c = next();
-      if (c == ')') break;
-      if (p_ == end_) unfinished("a point", line_);
-      if (count < 3 || c == '(' || c == '|' || c == '<' || c == '>' || c == '"')
-        throw InputError(name_, line_, fmt::format("\"{}\" is not a number; {}", shown(word()), layout));
-      if (begins_number(c) && count == 3 && !is_letter(c))
-        throw InputError(name_, line_, fmt::format("\"{}\" is not a diameter; {}", shown(word()), layout));
-      if (begins_number(c))
-        oddities_.add(AscOddity::extra_numbers, line_, "a point has more than four numbers");
-      p_ += word().size();  // the name of a section (S1) may follow
-    }
-    ++p_;
-    if (count < 3) throw InputError(name_, line_, fmt::format("a point has {} numbers; {}", count, layout));
-    if (count == 3) {
-      oddities_.add(AscOddity::no_diameter, line_, "a point has no diameter");
-      v[3] = 2.f * last_.radius;
-    }
-  }
-
-  void unknown_numbers(std::array<float, 4>& v) {
-    const std::array<float, 3> before{last_.x, last_.y, last_.z};
-    for (std::size_t i = 0; i < 3; ++i)
-      if (!std::isfinite(v[i])) {
-        if (!has_last_)
-          throw InputError(name_, line_, "the first point has no place; give its coordinates in µm");
-        oddities_.add(AscOddity::unknown_place, line_, "a coordinate is not finite");
-        v[i] = before[i];
-      }
-    if (v[3] >= 0.f && std::isfinite(v[3])) return;
-    if (v[3] < 0.f)
-      oddities_.add(AscOddity::negative_diameter, line_,
-                    [&] { return fmt::format("the diameter is {}", v[3]); });
-    else
-      oddities_.add(AscOddity::unknown_diameter, line_, "the diameter is not finite");
-    v[3] = 2.f * last_.radius;
-  }
-
   // Blocks -------------------------------------------------------------------------------------------------
-
-  struct Block {
-    std::string text;       // one blank between words, no comments
-    std::string_view word;  // its first
-    std::string_view quoted;
-    std::size_t numbers = 0;  // behind the word
-    std::size_t points = 0;   // brackets that begin with a number
-    bool quotes = false, splits = false, more = false;
-  };
-
-  /// From an opening bracket to behind the one that closes it, whatever is between them.
-  Block skip_block() {
-    Block block;
-    const std::size_t begin = line_;
-    std::size_t depth = 0;
-    bool first = true, opened = false, numbers = false;
-    do {
-      const char c = next();
-      if (p_ == end_) unfinished("a block", begin);
-      const bool glued = block.text.empty() || block.text.back() == '(' || c == ')';
-      if (!glued) block.text += ' ';
-      if (c == '(') {
-        ++depth;
-        block.text += c, ++p_;
-        block.splits = block.splits || (opened && depth > 2);
-        opened = true, numbers = false;
-        block.more = block.more || depth > 1;
-        continue;
-      }
-      if (c == ')') {
-        --depth;
-        block.text += c, ++p_;
-      } else if (c == '"') {
-        const std::string_view string = quoted();
-        (block.text += '"') += string;
-        block.text += '"';
-        if (block.quoted.empty()) block.quoted = string;
-        block.quotes = block.quotes || depth == 1;
-        block.more = true;
-      } else {
-        const std::string_view word = this->word();
-        if (first) block.word = word;
-        float value = 0.f;
-        bool exponent = false;
-        const char* q = p_;
-        const bool number = begins_number(c) && read_real<ends_word>(q, value, exponent);
-        block.points += number && opened && depth > 1;
-        block.splits = block.splits || c == '|';
-        block.numbers += number && numbers;
-        numbers = depth == 1 && (first || (numbers && number));
-        block.more = block.more || !first;
-        block.text += word;
-        p_ += word.size();
-      }
-      first = false, opened = false;
-    } while (depth > 0);
-    return block;
-  }
-
-  /// Whether a block in a tree or an outline has a word where a point has a number.
-  void refuse_broken_point(const Block& block, std::size_t line) const {
-    if (block.numbers >= 2 && std::ranges::find(numbered_words, block.word) == numbered_words.end())
-      throw InputError(name_, line, fmt::format("\"{}\" is not a number; {}", shown(block.word), layout));
-  }
 
   static bool is_marker(const Block& block) { return block.points > 0 && block.word != "Color"; }
 
@@ -410,8 +187,6 @@ class Reader {
     annotations_.emplace_back(key, std::move(block.text));
   }
 
-  void back_to(const char* p, std::size_t line) { p_ = p, line_ = line; }
-
   /// A block of the file.
   void block() {
     const char* const begin = p_;
@@ -419,8 +194,8 @@ class Reader {
     has_last_ = false, last_ = {};
     branch_ = {};
     branch_.line = line_;
-    own_soma_.clear();
-    said_.reset();
+    said_.soma.clear();
+    said_.section.reset();
     std::optional<SectionKind> type;
     std::optional<std::string_view> title;
     bool cell_body = false;
@@ -544,19 +319,12 @@ class Reader {
       }
     }
     ++p_;
-    if (!own_soma_.empty()) {
+    if (!said_.soma.empty()) {
       if (!soma_.contour_starts.empty() || own_.kind != SomaKind::none)
         throw InputError(name_, begin, "the soma is said twice; remove one of its outlines");
-      own_ = {.kind = own_soma_parents_.empty() ? SomaKind::sphere : SomaKind::cylinders,
-              .points = own_soma_,
-              .parents = own_soma_parents_,
-              .contour_starts = {}};
-      bool good = own_.points.size() == 1 ? own_soma_parents_.empty()
-                                          : own_soma_parents_.size() == own_.points.size();
-      for (std::size_t i = 0; i < own_.parents.size(); ++i)
-        good = good &&
-               (i == 0 ? own_.parents[i] == -1 : own_.parents[i] >= 0 && own_.parents[i] < std::int32_t(i));
-      if (!good) throw InputError(name_, begin, "the comments FOREST_… of the soma are no soma; remove them");
+      auto said = said_.whole_soma();
+      if (!said) throw InputError(name_, begin, "the comments FOREST_… of the soma are no soma; remove them");
+      own_ = *std::move(said);
       return;
     }
     if (soma_.points.size() == first) {
@@ -594,10 +362,6 @@ class Reader {
     std::size_t line = 0;
     std::size_t daughters = 0;
   };
-  struct Said {
-    SectionKind kind;
-    std::int32_t tag, soma_point;
-  };
   void tree(SectionKind kind, const std::string& properties) {
     branch_.kind = kind, branch_.tag = std::int32_t(kind);
     const std::size_t begin = branch_.line;
@@ -612,7 +376,7 @@ class Reader {
         const char inner = next();
         if (begins_number(inner)) [[likely]] {
           if (branch_.over) refuse_late_point();
-          if (said_) [[unlikely]]
+          if (said_.section) [[unlikely]]
             take_what_is_said();
           last_ = point();
           has_last_ = true;
@@ -717,7 +481,7 @@ class Reader {
   void spine() {
     const std::size_t begin = line_;
     ++p_;
-    own_spine_.reset();
+    said_.spine.reset();
     bool placed = false;
     std::size_t depth = 0;  // some programs put brackets around what is in the spine
     SpineSeat seat{.points = points_.size(), .spine = {}, .head = Vec3::Zero(), .said = false};
@@ -758,7 +522,7 @@ class Reader {
       }
     }
     ++p_;
-    if (own_spine_) seat.spine = *std::exchange(own_spine_, std::nullopt), seat.said = true;
+    if (said_.spine) seat.spine = *std::exchange(said_.spine, std::nullopt), seat.said = true;
     if (!placed && !seat.said)
       oddities_.add(AscOddity::spine_without_place, begin, "a spine has no point");
     else
@@ -801,121 +565,35 @@ class Reader {
     branch_.leaf = leaf;
   }
 
-  // Comments of ours ---------------------------------------------------------------------------------------
-
-  void own_comment(std::string_view text) {
-    const std::string_view key = text.substr(0, text.find(' '));
-    const std::string numbers = std::string(text.substr(key.size())) + '\n';
-    const char* p = numbers.data();
-    std::array<double, 7> v{};
-    std::size_t count = 0;
-    for (;;) {
-      while (is_blank(*p)) ++p;
-      float real = 0.f;
-      std::int64_t whole = 0;
-      bool exponent = false;
-      if (const char* q = p; read_integer(q, whole) && count < v.size() && !(whole == 0 && *p == '-'))
-        p = q, v[count++] = double(whole);
-      else if (count < v.size() && read_real(p, real, exponent) && std::isfinite(real))
-        v[count++] = double(real);
-      else
-        break;
-    }
-    const auto f = [&](std::size_t i) { return float(v[i]); };
-    const auto whole = [&](std::size_t i, double low, double high) {
-      return v[i] == std::floor(v[i]) && v[i] >= low && v[i] <= high;
-    };
-    bool good = *p == '\n';
-    constexpr double most = std::numeric_limits<std::int32_t>::max();
-    if (key == asc_sphere_key) {
-      good = good && count == 4 && v[3] >= 0. && own_soma_.empty();
-      own_soma_ = {{f(0), f(1), f(2), f(3)}};
-      own_soma_parents_.clear();
-    } else if (key == asc_cylinder_key) {
-      good = good && count == 5 && v[3] >= 0. && whole(4, -1., most);
-      if (own_soma_.empty()) own_soma_parents_.clear();
-      own_soma_.push_back({f(0), f(1), f(2), f(3)});
-      if (good) own_soma_parents_.push_back(std::int32_t(v[4]));
-    } else if (key == asc_section_key) {
-      good = good && count == 3 && whole(0, 0., 7.) && v[0] != 1. && whole(1, -most, most) &&
-             whole(2, -1., double(std::max(own_.points.size(), soma_.points.size())) - 1.);
-      if (good) said_ = {SectionKind(int(v[0])), std::int32_t(v[1]), std::int32_t(v[2])};
-    } else if (key == asc_spine_key) {
-      good = good && count == 7 && whole(6, 0., double(SpineShape::branched));
-      if (good)
-        own_spine_ = Spine{{}, f(0), Vec3(f(1), f(2), f(3)), f(4), f(5), static_cast<SpineShape>(int(v[6]))};
-    } else {
-      return;
-    }
-    if (!good)
-      throw InputError(
-          name_, line_,
-          fmt::format("the comment {} does not hold the numbers it should; remove the line", shown(key)));
-  }
-
   /// At the first point of the branch that a comment of ours is about.
   void take_what_is_said() {
     if (!points_.empty())
       throw InputError(
           name_, line_,
           fmt::format("the comment {} stands among the points of a branch; remove it", asc_section_key));
-    branch_.kind = said_->kind, branch_.tag = said_->tag, branch_.soma_point = said_->soma_point;
-    said_.reset();
+    branch_.kind = said_.section->kind, branch_.tag = said_.section->tag;
+    branch_.soma_point = said_.section->soma_point;
+    said_.section.reset();
   }
 
-  const std::string text_;  // with the zero behind it
-  const std::string& name_;
-  OddityList<AscOddity> oddities_;
-  const char* p_ = nullptr;
-  const char* end_ = nullptr;
-  std::size_t line_ = 1, soma_line_ = 0;
-  bool inside_ = false, to_the_letter_ = false, without_points_ = false, has_last_ = false;
+  bool inside_ = false, to_the_letter_ = false, without_points_ = false;
 
   MorphologyBuilder builder_;
   TracedSections sections_;
   Annotations annotations_;
   Soma soma_, own_;
-  std::vector<Point> own_soma_;
-  std::vector<std::int32_t> own_soma_parents_;
+  std::size_t soma_line_ = 0;
+  AscOwn said_;
 
   Lost lost_comments_, lost_properties_;
-  Point last_;  // the one before, for numbers that are not known
   Branch branch_;
   std::vector<Split> splits_;
   std::vector<Point> points_;  // of the branch
   std::string properties_;     // of the tree
   std::vector<SpineSeat> seats_;
-  std::optional<Said> said_;
-  std::optional<Spine> own_spine_;
 };
 
 }  // namespace
-
-std::string_view asc_comment(std::string_view text) {
-  constexpr std::string_view around = " \t\v\f";
-  text.remove_prefix(std::min(text.find_first_not_of("; \t\v\f"), text.size()));
-  return text.substr(0, text.find_last_not_of(around) + 1);
-}
-
-bool names_soma(std::string_view name) {
-  while (!name.empty() &&
-         (is_digit(name.back()) || is_blank(name.back()) || name.back() == '_' || name.back() == '-'))
-    name.remove_suffix(1);
-  return same_word(name, "cellbody") || same_word(name, "cell body") || same_word(name, "soma");
-}
-
-SpineShape spine_shape(std::string_view text) {
-  constexpr std::array<std::pair<std::string_view, SpineShape>, 5> shapes{
-      {{"stubby", SpineShape::stubby},
-       {"thin", SpineShape::thin},
-       {"mushroom", SpineShape::mushroom},
-       {"filopodi", SpineShape::filopodium},
-       {"branched", SpineShape::branched}}};
-  const std::string words = lower(text);
-  for (const auto& [word, shape] : shapes)
-    if (words.find(word) != words.npos) return shape;
-  return SpineShape::unknown;
-}
 
 bool asc_reads_as_annotation(std::string_view text, std::string_view key, std::string_view value) {
   const std::string name;
