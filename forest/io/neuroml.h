@@ -35,7 +35,7 @@ std::vector<Cell> read_all_neuroml(std::string_view bytes, const std::string& na
 /// Valid against NeuroML_v2beta5 and later. The same neuron gives the same bytes.
 std::string write_neuroml(const Morphology& morphology);
 
-/// Every deviation that is read, in the order of enum NeuromlOddity (neuroml.cpp).
+/// Every deviation that is read, in the order of enum NeuromlOddity (neuroml_document.h).
 std::span<const Oddity> neuroml_oddities();
 
 }  // namespace forest::io
