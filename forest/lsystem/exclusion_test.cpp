@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/lsystem/exclusion.h"
 
+#include <array>
 #include <cmath>
+#include <numbers>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -153,6 +156,29 @@ TEST(Exclusion, NoSegmentOfAThousandCellsPassesThroughAnyOfThousandsOfSomata) {
   EXPECT_GT(somata, 5000u);
   EXPECT_GT(segments, 50'000u);
   EXPECT_GT(bent, 900u);  // nearly all met something
+}
+
+// From every side, at somata that are long, three-cornered, or both.
+TEST(Exclusion, NoneEntersTheOutlineOfItsOwnSoma) {
+  const std::array<double, 4> outlines[] = {{.6, 0, 0, 0}, {0, -.7, 0, 0}, {-.2, 0, 0, .15}, {.3, .2, -.3, .1}};
+  for (const auto& [a2, b2, a3, b3] : outlines)
+    for (int side = 0; side < 24; ++side) {
+      const double from = 2. * std::numbers::pi * side / 24.;
+      const Grammar g = parse(
+          fmt::format("steps: 60\naxiom: Soma(20, {}, {}, {}, {}) Avoid(1) [ Basal At({}, {}, 0) !(1) Head({}, {}, 0) A ]\n"
+                      "g: A -> F(1, 1) A\n",
+                      a2, b2, a3, b3, 40. * std::cos(from), 40. * std::sin(from), -std::cos(from + .07),
+                      -std::sin(from + .07)),
+          "outlined");
+      const auto points = interpret(derive(g, 0, 0), g).points();
+      ASSERT_EQ(points.size(), 61u);
+      for (const Point& p : points) {
+        const double phi = std::atan2(double(p.y), double(p.x));
+        const double outline = 10. * (1. + a2 * std::cos(2. * phi) + b2 * std::sin(2. * phi) +
+                                      a3 * std::cos(3. * phi) + b3 * std::sin(3. * phi));
+        EXPECT_GE(double(p.position().norm()), outline + 1.5 - 1e-3) << g.text;
+      }
+    }
 }
 
 TEST(Exclusion, WithoutBeingAskedTheTurtleGoesThroughEverything) {

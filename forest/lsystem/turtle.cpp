@@ -314,7 +314,7 @@ class Turtle {
     must_be_in_world(step);
     const double apart = state_.avoid + radius;
     obstacles_.balls.clear();
-    if (soma_) obstacles_.balls.push_back({soma_place_, double(soma_->radius) + apart});
+    if (soma_) obstacles_.balls.push_back({soma_place_, soma_reach_ + apart});
     environment_.for_somata(here(), step.norm() + apart, [&](const Sphere& soma) {
       if (!cortex::Environment::encloses(soma, at_))
         obstacles_.balls.push_back({soma.centre.cast<double>() - at_, double(soma.radius) + apart});
@@ -464,6 +464,7 @@ class Turtle {
                       "than 1, and is {:g}",
                       bent));
     outline_ = outline;
+    soma_reach_ = double(soma_->radius) * (1. + bent);
   }
   Soma soma() const {
     if (outline_ == std::array<double, 4>{})
@@ -493,6 +494,7 @@ class Turtle {
   std::vector<double>* answers_ = nullptr;  // then nothing is drawn
   std::optional<Point> soma_;
   std::array<double, 4> outline_{};
+  double soma_reach_ = 0.;  // from its middle, of the place of its outline that is farthest at most
   double borne_ = 0.;  // spines, in the mean
   Eigen::Vector3d soma_place_ = Eigen::Vector3d::Zero();
   const cortex::Environment& environment_;
