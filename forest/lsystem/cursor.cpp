@@ -11,7 +11,12 @@
 
 namespace forest::lsystem {
 
-std::size_t Cursor::line() const { return std::size_t(std::ranges::count(text_.substr(0, at_), '\n')) + 1; }
+std::size_t Cursor::line() {
+  if (at_ < counted_) counted_ = 0, line_ = 1;
+  line_ += std::size_t(std::ranges::count(text_.substr(counted_, at_ - counted_), '\n'));
+  counted_ = at_;
+  return line_;
+}
 
 bool Cursor::more() {
   while (at_ < end_ && is_space(text_[at_])) ++at_;

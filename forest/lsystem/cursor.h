@@ -17,7 +17,7 @@ class Cursor {
     at_ = begin, end_ = end;
   }  // sees only this part from now on
   std::size_t at() const { return at_; }
-  std::size_t line() const;  // 1-based
+  std::size_t line();  // 1-based; counted on from where it was asked last
 
   // All of these pass over blanks first.
   bool more();  // is anything left
@@ -40,6 +40,7 @@ class Cursor {
   std::string_view text_;
   const std::string& file_;
   std::size_t at_ = 0, end_;
+  std::size_t counted_ = 0, line_ = 1;  // up to where lines are counted, and the line there
 };
 
 constexpr bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }

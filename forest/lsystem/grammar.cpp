@@ -54,6 +54,7 @@ class Parser {
     grammar_.name = std::filesystem::path(file).stem().string();
     grammar_.text = text;
     for (const TurtleSymbol& s : turtle_symbols()) {
+      by_name_.emplace(s.symbol, Symbol(grammar_.symbols.size()));
       grammar_.symbols.emplace_back(s.symbol);
       arities_.push_back({s.least, s.most, names_in(s.parameters), s.defaults});
     }
@@ -65,6 +66,7 @@ class Parser {
   Parser(std::string_view text, const Grammar& grammar)
       : clean_(text), text_(clean_, grammar.file), grammar_(grammar) {
     arities_.resize(grammar_.symbols.size());
+    for (const std::string& name : grammar_.symbols) by_name_.emplace(name, Symbol(by_name_.size()));
     closed_ = true;
   }
 
@@ -427,7 +429,7 @@ class Parser {
     do {
       const std::size_t place = (text_.more(), text_.at());
       const std::string name = text_.name("of a module");
-      if (std::ranges::find(grammar_.symbols, name) != grammar_.symbols.end())
+      if (by_name_.contains(name))
         text_.fail_at(place, fmt::format("module {} is there already", name));
       Arity arity{0, 0};
       if (text_.takes("(") && !text_.takes(")")) {
@@ -455,7 +457,7 @@ class Parser {
   }
 
   void production(const std::string& id, std::size_t place) {
-    if (std::ranges::find(grammar_.productions, id, &Production::id) != grammar_.productions.end())
+    if (!ids_.insert(id).second)
       text_.fail_at(place, fmt::format("there is a production {} already; give each its own name", id));
     Production p;
     p.id = id, p.line = text_.line();
@@ -563,6 +565,7 @@ class Parser {
     if (closed_) text_.fail(fmt::format("the grammar has no module {}", name));
     if (grammar_.symbols.size() >= 4096)
       text_.fail("there are more than 4096 modules; use parameters to tell them apart");
+    by_name_.emplace(name, Symbol(grammar_.symbols.size()));
     grammar_.symbols.push_back(name);
     arities_.push_back(std::move(arity));
     return Symbol(grammar_.symbols.size() - 1);
@@ -578,23 +581,24 @@ class Parser {
   // What looks like the name of one module and is read as a module for each of its letters.
   void note_word() {
     constexpr std::size_t least = 3;
-    const std::string_view rest = text_.rest();
-    const auto length = std::size_t(std::ranges::find_if_not(rest, is_letter) - rest.begin());
-    if (length < least || (noted_ && text_.at() < noted_)) return;
-    noted_ = text_.at() + length;
-    for (const std::string& name : grammar_.symbols)
-      if (name.size() > 1 && rest.substr(0, length).find(name) != std::string_view::npos) return;
-    words_.push_back({std::string(rest.substr(0, length)), text_.line()});
+    if (text_.at() < noted_) return;
+    const std::string_view rest = text_.rest(),
+                           word(rest.begin(), std::ranges::find_if_not(rest, is_letter));
+    if (word.size() < least) return;
+    noted_ = text_.at() + word.size();
+    for (std::size_t i = 0; i < word.size(); ++i)
+      if (longest_name(word.substr(i)).size() > 1) return;
+    words_.push_back({std::string(word), text_.line()});
   }
   // Of such, those with letters that nothing rewrites and the turtle does not draw.
   void doubt_words() {
     for (const auto& [word, line] : words_) {
       std::string idle;
       for (const char letter : word) {
-        const auto symbol = std::size_t(std::ranges::find(grammar_.symbols, std::string(1, letter)) -
-                                        grammar_.symbols.begin());
-        if (symbol < turtle_symbols().size() || symbol == grammar_.symbols.size() ||
-            !grammar_.productions_of[symbol].empty() || in_context_[symbol] || idle.find(letter) != idle.npos)
+        const auto found = by_name_.find(std::string_view(&letter, 1));
+        if (found == by_name_.end() || found->second < turtle_symbols().size() ||
+            !grammar_.productions_of[found->second].empty() || in_context_[found->second] ||
+            idle.find(letter) != idle.npos)
           continue;
         idle += idle.empty() ? "" : ", ", idle += letter;
       }
@@ -625,34 +629,44 @@ class Parser {
                 grammar_.file, p.line, p.id, grammar_.symbols[s.symbol], s.count));
   }
 
+  // The longest name of a module that a text begins with; empty when there is none. What begins as the text does and is no longer
+  // stands before it in the order of names, and what the text and the name right before it have in common is all that could be it.
+  std::string_view longest_name(std::string_view text) const {
+    for (;;) {
+      const auto after = by_name_.upper_bound(text);
+      if (after == by_name_.begin()) return {};
+      const std::string_view name = std::prev(after)->first;
+      if (text.starts_with(name)) return name;
+      text = text.substr(0, std::size_t(std::ranges::mismatch(text, name).in1 - text.begin()));
+    }
+  }
+
   // The longest declared name that stands here, else one letter (with _ and one more: a_r), digit or mark.
   Symbol symbol() {
     const std::string_view rest = text_.rest();
-    std::size_t best = grammar_.symbols.size(), length = 0;
-    for (std::size_t i = 0; i < grammar_.symbols.size(); ++i)
-      if (const std::string& name = grammar_.symbols[i]; name.size() > length && rest.starts_with(name))
-        best = i, length = name.size();
+    const std::string_view known = longest_name(rest);
     std::size_t own = 0;
     if (!rest.empty() && is_letter(rest[0]))
       own = rest.size() > 2 && rest[1] == '_' && (is_letter(rest[2]) || is_digit(rest[2])) ? 3 : 1;
     else if (!rest.empty() && (is_digit(rest[0]) || symbol_marks.find(rest[0]) != std::string_view::npos))
       own = 1;
-    if (own == 0 && length == 0)
+    if (own == 0 && known.empty())
       text_.fail(rest.empty()            ? "a module is missing here"
                  : rest[0] == '#'        ? "this character is no module; a comment begins with # and a blank"
                  : rest.starts_with("→") ? "this arrow is no module; write ->"
                  : rest[0] == '='        ? "this character is no module; a successor follows ->"
                                          : "this character is no module");
-    if (own == 1 && rest.size() > 1 && rest[0] == '?' && is_letter(rest[1]) && length == 0)
+    if (own == 1 && rest.size() > 1 && rest[0] == '?' && is_letter(rest[1]) && known.empty())
       text_.fail(fmt::format("?{} is no question; there are {}", rest[1], questions()));
-    if (own > length) {
+    if (own > known.size()) {
       std::string name(rest.substr(0, own));
       Arity arity = draws_as_f(name) ? arities_[std::size_t(Action::draw)] : Arity();
-      best = add_symbol(std::move(name), std::move(arity));
-      length = own;
+      const Symbol added = add_symbol(name, std::move(arity));
+      text_.skip(own);
+      return added;
     }
-    text_.skip(length);
-    return Symbol(best);
+    text_.skip(known.size());
+    return by_name_.find(known)->second;
   }
 
   void note(const Program& program, const Compiler& compiler) {
@@ -700,6 +714,8 @@ class Parser {
   Cursor text_;
   Grammar grammar_;
   std::vector<Arity> arities_;  // by symbol
+  std::map<std::string, Symbol, std::less<>> by_name_;
+  std::set<std::string> ids_;  // of productions
   std::vector<Symbol> ignored_;
   std::vector<Program> cells_;
   Meanings meanings_;

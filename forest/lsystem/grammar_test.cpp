@@ -256,6 +256,40 @@ TEST(Grammar, TakesTheLongestNameAndJoinsIndentedLines) {
   EXPECT_EQ(to_string(derive(g, 0, 0, 1), g), "TipOfTips(1)a_raBZa_raB");
 }
 
+// Modules whose names begin alike, and a word of them without blanks, beside the rule as it is said.
+RC_GTEST_PROP(Grammar, TheLongestNameThatFitsIsTaken, ()) {
+  const auto letters = rc::gen::elementOf(std::string("abc"));
+  std::set<std::string> names{"a", "b", "c"};
+  for (const auto& name : *rc::gen::container<std::vector<std::string>>(rc::gen::container<std::string>(letters)))
+    if (name.size() > 1) names.insert(name);
+  const std::string word = "a" + *rc::gen::container<std::string>(letters);
+  std::string text;
+  for (const std::string& name : names)
+    if (name.size() > 1) text += "module " + name + "\n";
+  const Grammar g = parse(text + "axiom: " + word + "\np: z -> z\n", "names");
+  std::size_t at = 0;
+  for (const Shape& s : g.axiom) {
+    std::string longest;
+    for (const std::string& name : names)
+      if (name.size() > longest.size() && word.compare(at, name.size(), name) == 0) longest = name;
+    RC_ASSERT(g.symbols[s.symbol] == longest);
+    at += longest.size();
+  }
+  RC_ASSERT(at == word.size());
+}
+
+// Each of them took a time that grew with its square: minutes.
+TEST(Grammar, LongTextsAreRead) {
+  EXPECT_EQ(parse("axiom: " + std::string(1'000'000, 'F') + "\nf: F -> F\n", "letters").axiom.size(), 1'000'000u);
+  std::string modules = "module Tip0", word = "axiom:", productions;
+  for (int i = 1; i < 4000; ++i) modules += fmt::format(", Tip{}", i);
+  for (int i = 0; i < 100'000; ++i) word += fmt::format(" Tip{}", i % 4000);
+  for (int i = 0; i < 50'000; ++i) productions += fmt::format("p{}: Tip{} -> FFFF\n", i, i % 4000);
+  const Grammar g = parse(modules + '\n' + word + '\n' + productions, "modules");
+  EXPECT_EQ(g.axiom.size(), 100'000u);
+  EXPECT_EQ(g.productions.back().line, 50'002u);
+}
+
 struct Bad {
   const char* text;
   std::size_t line;
