@@ -14,7 +14,8 @@ namespace forest::lsystem {
 namespace {
 
 constexpr int deepest = 100;                   // nested parentheses
-constexpr std::size_t most_inlined = 100'000;  // instructions of functions in one expression
+constexpr std::size_t most_inlined = 100'000;         // instructions of functions in one expression
+constexpr std::size_t most_written_out = 2'000'000;  // with arguments, in a grammar
 
 struct Binary {
   std::string_view token;
@@ -234,6 +235,12 @@ void Compiler::call(Program& out, const std::string& name, std::size_t place) {
                     fmt::format("with all that {} and other functions call the expression has more than "
                                 "{} instructions; keep parts of it in bindings or parameters",
                                 name, most_inlined));
+    written_out_ += f.body.size() + std::size_t(f.slots);
+    if (written_out_ > most_written_out)
+      text_.fail_at(place,
+                    fmt::format("with all that {} and other functions call the grammar has more than {} "
+                                "instructions and arguments; call fewer functions within functions",
+                                name, most_written_out));
     const std::int32_t base = slots_;
     slots_ += f.slots;
     const std::vector<std::size_t> begins = arguments(out, {name, f.parameters});

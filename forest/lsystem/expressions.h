@@ -37,7 +37,9 @@ struct Signature {
 // Compiles expressions at a cursor; knows the slots of the production (or function) it works for.
 class Compiler {
  public:
-  Compiler(Cursor& text, const Meanings& meanings) : text_(text), meanings_(meanings) {}
+  /// @param written_out  instructions and arguments of functions in the whole text, which it adds to
+  Compiler(Cursor& text, const Meanings& meanings, std::size_t& written_out)
+      : text_(text), meanings_(meanings), written_out_(written_out) {}
 
   void add_slot(const std::string& name);
   std::int32_t slots() const { return slots_; }
@@ -87,6 +89,7 @@ class Compiler {
 
   Cursor& text_;
   const Meanings& meanings_;
+  std::size_t& written_out_;
   std::vector<std::string> names_;  // of slots; those of inlined functions have none
   std::int32_t slots_ = 0;
   std::size_t barrier_ = 0;

@@ -91,7 +91,7 @@ class Parser {
   }
 
   Word word() {
-    Compiler compiler(text_, meanings_);
+    Compiler compiler(text_, meanings_, written_out_);
     std::vector<Shape> shapes;
     Program values;
     successor(compiler, shapes, values);
@@ -200,7 +200,7 @@ class Parser {
   }
 
   double constant() {
-    Compiler compiler(text_, meanings_);
+    Compiler compiler(text_, meanings_, written_out_);
     Program program;
     const std::size_t place = text_.at();
     compiler.expression(program);
@@ -229,7 +229,7 @@ class Parser {
   void cell_value() {
     const std::string name = new_name("of the value that is drawn once a neuron");
     text_.expect("=", "between a name and its value");
-    Compiler compiler(text_, meanings_);
+    Compiler compiler(text_, meanings_, written_out_);
     Program program;
     compiler.expression(program);
     if (compiler.sums())
@@ -247,7 +247,7 @@ class Parser {
   void callable(bool may_draw) {
     const std::size_t place = text_.at();
     const std::string name = new_name("of the function");
-    Compiler compiler(text_, meanings_);
+    Compiler compiler(text_, meanings_, written_out_);
     Meaning meaning{.kind = Meaning::function};
     if (text_.takes("(") && !text_.takes(")")) {
       do compiler.add_slot(meaning.parameters.emplace_back(text_.name("of a parameter")));
@@ -375,7 +375,7 @@ class Parser {
       text_.expect(")", "after the parameter");
     }
     text_.expect("=", "between a total and the module that it is of");
-    Compiler compiler(text_, meanings_);
+    Compiler compiler(text_, meanings_, written_out_);
     const std::size_t place = (text_.more(), text_.at());
     const std::vector<Shape> module = context(compiler);
     if (module.size() != 1 || is(module[0], Action::push) || is(module[0], Action::pop))
@@ -413,7 +413,7 @@ class Parser {
       text_.fail_at(place, error.what());
     }
     text_.expect("(", "after a feature");
-    Compiler compiler(text_, meanings_);
+    Compiler compiler(text_, meanings_, written_out_);
     compiler.add_slot(text_.name("of the value of the feature"));
     text_.expect(")", "after the value of the feature");
     text_.expect("=", "between a feature and how well its value is liked");
@@ -450,7 +450,7 @@ class Parser {
   void axiom() {
     if (!grammar_.axiom.empty()) text_.fail("there is an axiom already; a grammar has one");
     grammar_.axiom_line = text_.line();
-    Compiler compiler(text_, meanings_);
+    Compiler compiler(text_, meanings_, written_out_);
     successor(compiler, grammar_.axiom, grammar_.axiom_values);
     note(grammar_.axiom_values, compiler);
     if (grammar_.axiom.empty()) text_.fail("the axiom is empty; give at least one module");
@@ -461,7 +461,7 @@ class Parser {
       text_.fail_at(place, fmt::format("there is a production {} already; give each its own name", id));
     Production p;
     p.id = id, p.line = text_.line();
-    Compiler compiler(text_, meanings_);
+    Compiler compiler(text_, meanings_, written_out_);
     std::vector<Shape> middle = context(compiler);
     if (text_.takes("<")) {
       p.left = std::move(middle);
@@ -719,6 +719,7 @@ class Parser {
   std::vector<Symbol> ignored_;
   std::vector<Program> cells_;
   Meanings meanings_;
+  std::size_t written_out_ = 0;  // of functions
   std::map<std::string, std::uint32_t, std::less<>> declarations_;
   std::string declared_;  // by the statement that is read, and whether that is a distribution
   bool draws_ = false;

@@ -379,6 +379,26 @@ TEST(Grammar, FunctionsThatGrowBeyondMeasureAreRefused) {
   EXPECT_TRUE(why.starts_with("deep.lsys:1")) << why;
 }
 
+// Each expression is short enough, but there are many; and one of many arguments and no instructions.
+TEST(Grammar, FunctionsThatFillTheMemoryTogetherAreRefused) {
+  std::string text = "function f0(x) = x + 1\n", many = "function g0(", arguments, word;
+  for (int i = 1; i < 14; ++i) text += fmt::format("function f{0}(x) = f{1}(x) + f{1}(x + 1)\n", i, i - 1);
+  for (int i = 0; i < 500; ++i) many += fmt::format("a{}, ", i), arguments += "1, ";
+  many += "z) = z\nfunction g1(x) = g0(" + arguments + "x)\n";
+  for (int i = 0; i < 4; ++i) {
+    many += fmt::format("function g{}(x) = 0", i + 2);
+    for (int k = 0; k < 20; ++k) many += fmt::format(" + g{}(x)", i + 1);
+    many += '\n';
+  }
+  for (int i = 0; i < 500; ++i) word += " B(f13(1))";
+  for (const std::string& grammar : {text + "axiom: A\np: A ->" + word + "\n", many + "axiom: A\np: A -> B(g5(1))\n"}) {
+    const std::string why = refused<InputError>([&] { parse(grammar, "many.lsys"); });
+    EXPECT_NE(why.find("the grammar has more than 2000000 instructions"), why.npos) << why;
+  }
+  const Grammar read = parse(text + "axiom: A\np: A -> B(f13(1)) B(f13(1))\n", "two.lsys");
+  EXPECT_EQ(derive(read, 0, 0, 1).parameters.size(), 2u);
+}
+
 // Cut anywhere, with anything put in: a value or an InputError, never anything else.
 RC_GTEST_PROP(Grammar, AnyTextIsReadOrRefused, ()) {
   static const std::string whole =
