@@ -68,15 +68,19 @@ double normal(Random& random, double mean, double sd) {
 double exponential(Random& random, double mean) { return mean >= 0. ? random.exponential(mean) : nonsense; }
 
 double gamma(Random& random, double shape, double scale) {
-  return shape > 0. && std::isfinite(shape) ? random.gamma(shape, scale) : nonsense;
+  return shape > 0. && std::isfinite(shape) && scale >= 0. ? random.gamma(shape, scale) : nonsense;
 }
 
 double weibull(Random& random, double shape, double scale) {
-  return shape > 0. ? scale * std::pow(random.exponential(1.), 1. / shape) : nonsense;
+  return shape > 0. && scale >= 0. ? scale * std::pow(random.exponential(1.), 1. / shape) : nonsense;
 }
 
 double von_mises(Random& random, double mean, double concentration) {
   return concentration >= 0. ? random.von_mises(mean, concentration) : nonsense;
+}
+
+double chance(Random& random, double p) {
+  return p >= 0. && p <= 1. ? double(random.uniform() < p) : nonsense;
 }
 
 // Knuth 1969, in pieces of at most 32 so that the product does not vanish.
@@ -326,7 +330,7 @@ double* run(std::span<const Instruction> program, double* slots, std::span<const
         unary([](double a) { return std::round(a); });
         break;
       case Op::sign:
-        unary([](double a) { return double(a > 0.) - double(a < 0.); });
+        unary([](double a) { return std::isnan(a) ? a : double(a > 0.) - double(a < 0.); });
         break;
       case Op::min:
         binary([](double a, double b) { return b < a || std::isnan(b) ? b : a; });
@@ -359,7 +363,7 @@ double* run(std::span<const Instruction> program, double* slots, std::span<const
         unary([&](double a) { return poisson(random, a); });
         break;
       case Op::chance:
-        unary([&](double a) { return double(random.uniform() < a); });
+        unary([&](double a) { return chance(random, a); });
         break;
       case Op::dealt:
         unary([&](double a) { return dealt(random, a); });
