@@ -225,10 +225,7 @@ void report(const Options& options, const lsystem::Grammar& grammar, const io::C
   out.update(more);
   console.print(out);
   if (total.segments == 0)
-    console.warn(fmt::format("no neuron has a segment; {}",
-                             grammar.steps == 0
-                                 ? "the grammar does not say how many steps to derive, as in steps: 10"
-                                 : "look at its axiom and productions"));
+    console.warn("no neuron has a segment; look at the axiom and productions of the grammar");
   const double count = double(options.count);
   console.table(
       {"grammar", "neurons", "segments each", "length each (µm)"},

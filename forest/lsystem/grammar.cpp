@@ -590,6 +590,13 @@ class Parser {
       if (longest_name(word.substr(i)).size() > 1) return;
     words_.push_back({std::string(word), text_.line()});
   }
+  void doubt_steps() {
+    if (grammar_.steps == 0)
+      grammar_.doubts.push_back(fmt::format(
+          "{}:{}: no production is used, since it is not said how many steps to derive; write it, for example steps: 10",
+          grammar_.file, grammar_.productions[0].line));
+  }
+
   // Of such, those with letters that nothing rewrites and the turtle does not draw.
   void doubt_words() {
     for (const auto& [word, line] : words_) {
@@ -694,6 +701,7 @@ class Parser {
       for (const auto* side : {&p.left, &p.right})
         for (const Shape& s : *side) in_context_[s.symbol] = true;
     for (const Total& t : grammar_.totals) in_context_[t.module.symbol] = true;
+    doubt_steps();
     doubt_words();
     doubt_questions();
     for (const Production& p : grammar_.productions)

@@ -345,7 +345,7 @@ TEST(Grammar, ErrorsNameLineColumnAndRemedy) {
 
 // A name that was not declared is a module for each of its letters, as in the book; it is said where nothing is done with them.
 TEST(Grammar, DoubtsWhatLooksLikeAModule) {
-  const auto doubts = [](const std::string& text) { return parse(text, "g").doubts; };
+  const auto doubts = [](const std::string& text) { return parse(text + "steps: 1\n", "g").doubts; };
   EXPECT_EQ(doubts("axiom: Soma(9) basal A\ng: A -> F(1)\n"),
             (std::vector<std::string>{
                 "g:1: 'basal' is read as 5 modules of one letter, and nothing is done with b, a, s, l; "
@@ -360,6 +360,14 @@ TEST(Grammar, DoubtsWhatLooksLikeAModule) {
                 "g:2: production a asks ?D with 4 parameters, and no word has it so, so that it "
                 "never fits; write as many of them in both"}));
   EXPECT_TRUE(doubts("module Tip(x)\naxiom: Tip(1)F\nt: Tip(x) -> Soma(1)BasalTip(x)\n").empty());
+}
+
+TEST(Grammar, DoubtsProductionsThatNoStepUses) {
+  const std::string text = "axiom: A F(1)\n\ngrow: A -> F(1) A\n";
+  EXPECT_EQ(parse(text, "g").doubts,
+            (std::vector<std::string>{"g:3: no production is used, since it is not said how many steps to derive; write "
+                                      "it, for example steps: 10"}));
+  EXPECT_TRUE(parse(text + "steps: 1\n", "g").doubts.empty());
 }
 
 TEST(Grammar, DeepNestingIsRefusedNotSuffered) {
