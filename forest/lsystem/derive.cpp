@@ -100,6 +100,7 @@ struct Deriver::State {
       throw InputError(grammar.file, grammar.axiom_line,
                        "the axiom has a parameter that is not a finite number; mend its expression");
     live = nodes.size();
+    if (live > grammar.limit) runaway();
     for (std::uint32_t i = 0; i < nodes.size(); ++i) {
       nodes[i].previous = i == 0 ? none : i - 1;
       nodes[i].next = i + 1 == nodes.size() ? none : i + 1;
@@ -271,10 +272,12 @@ struct Deriver::State {
   [[noreturn]] void runaway() const {
     const auto most = std::size_t(std::ranges::max_element(written) - written.begin());
     const Production& p = grammar.productions[most];
-    throw LimitError(
-        fmt::format("{}:{}: the word has more than {} modules, most of them written by production {}; "
-                    "let it branch less, stop it by a condition, or raise limit:",
-                    grammar.file, p.line, grammar.limit, p.id));
+    const bool axiom = grammar.axiom.size() > written[most];
+    throw LimitError(fmt::format(
+        "{}:{}: the word has more than {} modules, most of them written by {}, or raise limit:", grammar.file,
+        axiom ? grammar.axiom_line : p.line, grammar.limit,
+        axiom ? "the axiom; shorten it"
+              : fmt::format("production {}; let it branch less, stop it by a condition", p.id)));
   }
 
   void link(const Change& c) {

@@ -20,7 +20,7 @@ class Deriver {
   ~Deriver();
   Deriver(Deriver&&) noexcept;
 
-  /// Derives a new word from the axiom. Throws LimitError, naming the production that wrote most, when the
+  /// Derives a new word from the axiom. Throws LimitError, naming the production that wrote most, or the axiom, when the
   /// word would have more modules than the grammar's limit; Error when a number is not finite or a weight is
   /// negative.
   /// @param steps  of derivation; the grammar's own when not given. Ends before when nothing is left to

@@ -3,6 +3,7 @@
 
 #include <map>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -142,6 +143,21 @@ TEST(Derivation, ARunawayProductionIsStoppedAndNamed) {
     EXPECT_NE(what.find("production rabbits"), std::string::npos) << what;
     EXPECT_NE(what.find("1000 modules"), std::string::npos) << what;
   }
+}
+
+TEST(Derivation, AnAxiomBeyondTheLimitIsNamedItself) {
+  for (const int steps : {0, 1})
+    for (const char* axiom : {"BBBBBBBBBB", "AAAAAAAAA", "AAAAAAAA B"}) {
+      const Grammar g = parse(fmt::format("limit: 8\n\naxiom: {}\np: A -> AB\n", axiom), "long.lsys");
+      const std::string why = refused<LimitError>([&] { derive(g, 0, 0, steps); });
+      EXPECT_TRUE(why.starts_with(
+          "long.lsys:3: the word has more than 8 modules, most of them written by the axiom; "))
+          << why;
+    }
+  // As many as are allowed are; what a production adds then is still mostly the axiom's.
+  const Grammar g = parse("limit: 8\naxiom: AAAAAAAB\np: A -> AB\n", "full.lsys");
+  EXPECT_EQ(derive(g, 0, 0, 0).modules.size(), 8u);
+  EXPECT_TRUE(refused<LimitError>([&] { derive(g, 0, 0, 1); }).starts_with("full.lsys:2: "));
 }
 
 TEST(Derivation, WhatIsNoNumberIsAnErrorThatNamesTheProduction) {

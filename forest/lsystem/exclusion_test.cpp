@@ -160,16 +160,17 @@ TEST(Exclusion, NoSegmentOfAThousandCellsPassesThroughAnyOfThousandsOfSomata) {
 
 // From every side, at somata that are long, three-cornered, or both.
 TEST(Exclusion, NoneEntersTheOutlineOfItsOwnSoma) {
-  const std::array<double, 4> outlines[] = {{.6, 0, 0, 0}, {0, -.7, 0, 0}, {-.2, 0, 0, .15}, {.3, .2, -.3, .1}};
+  const std::array<double, 4> outlines[] = {
+      {.6, 0, 0, 0}, {0, -.7, 0, 0}, {-.2, 0, 0, .15}, {.3, .2, -.3, .1}};
   for (const auto& [a2, b2, a3, b3] : outlines)
     for (int side = 0; side < 24; ++side) {
       const double from = 2. * std::numbers::pi * side / 24.;
-      const Grammar g = parse(
-          fmt::format("steps: 60\naxiom: Soma(20, {}, {}, {}, {}) Avoid(1) [ Basal At({}, {}, 0) !(1) Head({}, {}, 0) A ]\n"
-                      "g: A -> F(1, 1) A\n",
-                      a2, b2, a3, b3, 40. * std::cos(from), 40. * std::sin(from), -std::cos(from + .07),
-                      -std::sin(from + .07)),
-          "outlined");
+      const Grammar g = parse(fmt::format("steps: 60\naxiom: Soma(20, {}, {}, {}, {}) Avoid(1) [ Basal "
+                                          "At({}, {}, 0) !(1) Head({}, {}, 0) A ]\n"
+                                          "g: A -> F(1, 1) A\n",
+                                          a2, b2, a3, b3, 40. * std::cos(from), 40. * std::sin(from),
+                                          -std::cos(from + .07), -std::sin(from + .07)),
+                              "outlined");
       const auto points = interpret(derive(g, 0, 0), g).points();
       ASSERT_EQ(points.size(), 61u);
       for (const Point& p : points) {

@@ -13,8 +13,8 @@
 namespace forest::lsystem {
 namespace {
 
-constexpr int deepest = 100;                   // nested parentheses
-constexpr std::size_t most_inlined = 100'000;         // instructions of functions in one expression
+constexpr int deepest = 100;                         // nested parentheses
+constexpr std::size_t most_inlined = 100'000;        // instructions of functions in one expression
 constexpr std::size_t most_written_out = 2'000'000;  // with arguments, in a grammar
 
 struct Binary {

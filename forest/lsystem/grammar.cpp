@@ -429,8 +429,7 @@ class Parser {
     do {
       const std::size_t place = (text_.more(), text_.at());
       const std::string name = text_.name("of a module");
-      if (by_name_.contains(name))
-        text_.fail_at(place, fmt::format("module {} is there already", name));
+      if (by_name_.contains(name)) text_.fail_at(place, fmt::format("module {} is there already", name));
       Arity arity{0, 0};
       if (text_.takes("(") && !text_.takes(")")) {
         do arity.names.push_back(text_.name("of a parameter"));
@@ -582,8 +581,7 @@ class Parser {
   void note_word() {
     constexpr std::size_t least = 3;
     if (text_.at() < noted_) return;
-    const std::string_view rest = text_.rest(),
-                           word(rest.begin(), std::ranges::find_if_not(rest, is_letter));
+    const std::string_view rest = text_.rest(), word(rest.begin(), std::ranges::find_if_not(rest, is_letter));
     if (word.size() < least) return;
     noted_ = text_.at() + word.size();
     for (std::size_t i = 0; i < word.size(); ++i)
@@ -592,9 +590,10 @@ class Parser {
   }
   void doubt_steps() {
     if (grammar_.steps == 0)
-      grammar_.doubts.push_back(fmt::format(
-          "{}:{}: no production is used, since it is not said how many steps to derive; write it, for example steps: 10",
-          grammar_.file, grammar_.productions[0].line));
+      grammar_.doubts.push_back(
+          fmt::format("{}:{}: no production is used, since it is not said how many steps to derive; write "
+                      "it, for example steps: 10",
+                      grammar_.file, grammar_.productions[0].line));
   }
 
   // Of such, those with letters that nothing rewrites and the turtle does not draw.

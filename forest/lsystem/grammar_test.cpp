@@ -260,7 +260,8 @@ TEST(Grammar, TakesTheLongestNameAndJoinsIndentedLines) {
 RC_GTEST_PROP(Grammar, TheLongestNameThatFitsIsTaken, ()) {
   const auto letters = rc::gen::elementOf(std::string("abc"));
   std::set<std::string> names{"a", "b", "c"};
-  for (const auto& name : *rc::gen::container<std::vector<std::string>>(rc::gen::container<std::string>(letters)))
+  for (const auto& name :
+       *rc::gen::container<std::vector<std::string>>(rc::gen::container<std::string>(letters)))
     if (name.size() > 1) names.insert(name);
   const std::string word = "a" + *rc::gen::container<std::string>(letters);
   std::string text;
@@ -280,7 +281,8 @@ RC_GTEST_PROP(Grammar, TheLongestNameThatFitsIsTaken, ()) {
 
 // Each of them took a time that grew with its square: minutes.
 TEST(Grammar, LongTextsAreRead) {
-  EXPECT_EQ(parse("axiom: " + std::string(1'000'000, 'F') + "\nf: F -> F\n", "letters").axiom.size(), 1'000'000u);
+  EXPECT_EQ(parse("axiom: " + std::string(1'000'000, 'F') + "\nf: F -> F\n", "letters").axiom.size(),
+            1'000'000u);
   std::string modules = "module Tip0", word = "axiom:", productions;
   for (int i = 1; i < 4000; ++i) modules += fmt::format(", Tip{}", i);
   for (int i = 0; i < 100'000; ++i) word += fmt::format(" Tip{}", i % 4000);
@@ -365,8 +367,9 @@ TEST(Grammar, DoubtsWhatLooksLikeAModule) {
 TEST(Grammar, DoubtsProductionsThatNoStepUses) {
   const std::string text = "axiom: A F(1)\n\ngrow: A -> F(1) A\n";
   EXPECT_EQ(parse(text, "g").doubts,
-            (std::vector<std::string>{"g:3: no production is used, since it is not said how many steps to derive; write "
-                                      "it, for example steps: 10"}));
+            (std::vector<std::string>{
+                "g:3: no production is used, since it is not said how many steps to derive; write "
+                "it, for example steps: 10"}));
   EXPECT_TRUE(parse(text + "steps: 1\n", "g").doubts.empty());
 }
 
@@ -399,7 +402,8 @@ TEST(Grammar, FunctionsThatFillTheMemoryTogetherAreRefused) {
     many += '\n';
   }
   for (int i = 0; i < 500; ++i) word += " B(f13(1))";
-  for (const std::string& grammar : {text + "axiom: A\np: A ->" + word + "\n", many + "axiom: A\np: A -> B(g5(1))\n"}) {
+  for (const std::string& grammar :
+       {text + "axiom: A\np: A ->" + word + "\n", many + "axiom: A\np: A -> B(g5(1))\n"}) {
     const std::string why = refused<InputError>([&] { parse(grammar, "many.lsys"); });
     EXPECT_NE(why.find("the grammar has more than 2000000 instructions"), why.npos) << why;
   }

@@ -495,7 +495,7 @@ class Turtle {
   std::optional<Point> soma_;
   std::array<double, 4> outline_{};
   double soma_reach_ = 0.;  // from its middle, of the place of its outline that is farthest at most
-  double borne_ = 0.;  // spines, in the mean
+  double borne_ = 0.;       // spines, in the mean
   Eigen::Vector3d soma_place_ = Eigen::Vector3d::Zero();
   const cortex::Environment& environment_;
   Eigen::Vector3d at_;  // of the turtle's origin in the tissue
