@@ -9,6 +9,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "forest/core/error.h"
+#include "forest/repository/names.h"
 #include "forest/statistics/comparison.h"
 #include "forest/statistics/metric.h"
 #include "forest/statistics/persistence_image.h"
@@ -228,7 +230,14 @@ void run(const Options& options, Console& console) {
   const std::array<Sample, 2> samples{
       read_sample({stored ? options.population : options.samples[0]}, options.repo, console),
       read_sample({stored ? options.with : options.samples[1]}, options.repo, console)};
-  for (const Sample& sample : samples) must_have_sections(sample, options.kind);
+  constexpr std::size_t fewest = 4;  // as cross-validation needs (statistics/discriminator.h)
+  for (const Sample& sample : samples) {
+    must_have_sections(sample, options.kind);
+    if (sample.neurons.size() < fewest)
+      throw Error(
+          fmt::format("{} has {}, and a population of fewer than four cannot be told from another; add cells",
+                      repository::escaped(sample.name), counted(sample.neurons.size(), "cell")));
+  }
   const std::vector<Group> groups = groups_of(options.kind);
   std::array<FeatureTable, 2> tables{measured(samples[0], groups, console),
                                      measured(samples[1], groups, console)};

@@ -291,18 +291,11 @@ std::function<void()> distributions(CLI::App& command, Console& console) {
                           ->type_name("REPO");
   CLI::Option* population =
       command.add_option("--population", options->population, "Only those of this population")->needs(repo);
-  command
-      .add_option("--kind", options->kind, "Sections that are meant: dendrite, all, axon, basal, apical, …")
-      ->type_name("KIND")
-      ->capture_default_str()
-      ->check([](const std::string& word) -> std::string {
-        try {
-          kind_set(word);
-          return {};
-        } catch (const Error& error) {
-          return error.what();
-        }
-      });
+  must_be_kind(*command
+                    .add_option("--kind", options->kind,
+                                "Sections that are meant: dendrite, all, axon, basal, apical, …")
+                    ->type_name("KIND")
+                    ->capture_default_str());
   command.add_option("--by", options->by, "Fit in bins of order, path, radius or height")
       ->check(CLI::IsMember({"nothing", "order", "path", "radius", "height"}))
       ->type_name("BY")

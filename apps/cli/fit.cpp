@@ -219,10 +219,10 @@ std::function<void()> fit(CLI::App& command, Console& console) {
   must_be_name(*model->needs(repo));
   into->add_option("-o,--out", options->out, "A file for the grammar");
   into->require_option(1, 2);
-  command
-      .add_option("--kind", options->kinds,
-                  "Kinds of sections to model: dendrite, axon, basal, apical, glia, all")
-      ->capture_default_str();
+  must_be_kind(*command
+                    .add_option("--kind", options->kinds,
+                                "Kinds of sections to model: dendrite, axon, basal, apical, glia, all")
+                    ->capture_default_str());
   CLI::Option* form =
       command
           .add_option(

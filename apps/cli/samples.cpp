@@ -280,18 +280,22 @@ CLI::Option* add_slices(CLI::App& command, std::string& expression) {
       });
 }
 
+void must_be_kind(CLI::Option& option) {
+  option.check([](const std::string& word) -> std::string {
+    try {
+      statistics::kind_set(word);
+      return {};
+    } catch (const Error& error) {
+      return error.what();
+    }
+  });
+}
+
 void add_kind(CLI::App& command, std::string& kind) {
-  command.add_option("--kind", kind, "Sections to measure: all, dendrite, axon, basal, apical, …")
-      ->type_name("KIND")
-      ->capture_default_str()
-      ->check([](const std::string& word) -> std::string {
-        try {
-          statistics::kind_set(word);
-          return {};
-        } catch (const Error& error) {
-          return error.what();
-        }
-      });
+  must_be_kind(
+      *command.add_option("--kind", kind, "Sections to measure: all, dendrite, axon, basal, apical, …")
+           ->type_name("KIND")
+           ->capture_default_str());
 }
 
 void add_report(CLI::App& command, fs::path& report) {

@@ -61,6 +61,9 @@ void set_slices(std::span<statistics::FeatureTable* const> tables, const std::st
 /// --slices, a regular expression.
 CLI::Option* add_slices(CLI::App& command, std::string& expression);
 
+/// An option's value must be a word for kinds of sections.
+void must_be_kind(CLI::Option& option);
+
 /// --kind, as the verb measure has it.
 void add_kind(CLI::App& command, std::string& kind);
 

@@ -9,14 +9,7 @@
 namespace forest::io {
 
 PlainText plain_text(std::string_view bytes, const std::string& name) {
-  // Of a text that begins without a mark in Latin letters every second byte is zero.
-  const auto zero = [&](std::size_t at) { return at < bytes.size() && bytes[at] == '\0'; };
-  const bool halves = bytes.size() >= 4 && zero(0) == zero(2) && zero(1) == zero(3) && zero(0) != zero(1);
-  if (bytes.starts_with(std::string_view("\xff\xfe\0\0", 4)) ||
-      bytes.starts_with(std::string_view("\0\0\xfe\xff", 4)))
-    throw InputError(name, 1, "is written in UTF-32; save it as plain text (UTF-8 or ASCII)");
-  if (bytes.starts_with("\xff\xfe") || bytes.starts_with("\xfe\xff") || halves)
-    throw InputError(name, 1, "is written in UTF-16; save it as plain text (UTF-8 or ASCII)");
+  must_be_plain(bytes, name);
   PlainText result{.text = without_byte_order_mark(bytes)};
   result.byte_order_mark = result.text.size() < bytes.size();
   while (!result.text.empty() && (result.text.back() == '\0' || result.text.back() == '\x1a')) {

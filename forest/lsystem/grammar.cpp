@@ -738,7 +738,10 @@ class Parser {
 
 }  // namespace
 
-Grammar parse(std::string_view text, const std::string& file) { return Parser(text, file).grammar(); }
+Grammar parse(std::string_view text, const std::string& file) {
+  must_be_plain(text, file);
+  return Parser(text, file).grammar();
+}
 
 Grammar parse_file(const std::filesystem::path& path) {
   const MappedFile file(path);

@@ -345,6 +345,15 @@ TEST(Grammar, ErrorsNameLineColumnAndRemedy) {
   }
 }
 
+TEST(Grammar, TextsOfWideLettersAreToldAsSuch) {
+  const std::string text = "axiom: A\ng: A -> F(1) A\n";
+  std::string wide;
+  for (const char c : text) wide += {c, '\0'};
+  for (const std::string& one : {wide, "\xff\xfe" + wide, "\xfe\xff" + std::string(1, '\0') + wide})
+    EXPECT_EQ(refused<InputError>([&] { parse(one, "wide.lsys"); }),
+              "wide.lsys:1: is written in UTF-16; save it as plain text (UTF-8 or ASCII)");
+}
+
 // A name that was not declared is a module for each of its letters, as in the book; it is said where nothing is done with them.
 TEST(Grammar, DoubtsWhatLooksLikeAModule) {
   const auto doubts = [](const std::string& text) { return parse(text + "steps: 1\n", "g").doubts; };

@@ -52,6 +52,7 @@ refuses 'needs two such neurons' $BRAINFOREST fit few -o few.lsys
 refuses 'none of the 12 neurons of traced has a section of kind axon' $BRAINFOREST fit traced --kind axon -o axon.lsys
 refuses "finds nothing in any name" $BRAINFOREST fit traced --calibrate --slices nosuch -o axon.lsys
 fails_with 2 '--calibrate' $BRAINFOREST fit traced --slices nosuch -o axon.lsys
+fails_with 2 'nosuch' $BRAINFOREST fit traced --kind dendrite nosuch -o axon.lsys
 fails_with 2 'is no name' $BRAINFOREST fit traced --model "$(printf 'a\tb')" --repo cells.db
 printf 'no repository\n' >no.db
 refuses 'no.db' $BRAINFOREST fit "$(pwd)/nobody" --model like_traced --repo no.db  # asked before anything is read

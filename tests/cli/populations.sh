@@ -102,7 +102,7 @@ fails_with 2 'at most 1000 characters' $BRAINFOREST compare one two --slices "$(
 $BRAINFOREST compare one two $quick --slices '(a+)+[!]|-1-0000.' >/dev/null 2>part.txt  # no pattern takes for ever
 grep -q 'finds nothing in 14 of 24 names' part.txt
 
-refuses 'fewer than four' $BRAINFOREST compare one all/*-00000.swc
+refuses '-00000.swc has 1 cell, and a population of fewer than four' $BRAINFOREST compare one all/*-00000.swc
 $BRAINFOREST compare one one $quick >/dev/null 2>own.txt  # the same cells on both sides
 grep -q 'in one, too' own.txt
 
