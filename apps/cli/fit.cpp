@@ -82,8 +82,7 @@ std::string provenance(const Options& options, const Sample& sample) {
   constexpr std::size_t width = 120;
   std::string line = "# They are";
   for (std::size_t i = 0; i < sample.cells.size(); ++i) {
-    const std::string cell =
-        ' ' + repository::escaped(sample.cells[i]) + (i + 1 < sample.cells.size() ? "," : "");
+    const std::string cell = ' ' + listed(sample.cells[i]) + (i + 1 < sample.cells.size() ? "," : "");
     if (line.size() + cell.size() > width) text += std::exchange(line, "#") + '\n';
     line += cell;
   }

@@ -64,6 +64,16 @@ repository::TextsByName distributions_of(const lsystem::Grammar& grammar) {
   return distributions;
 }
 
+std::string listed(const std::string& cell) {
+  std::string text;
+  for (const char c : repository::escaped(cell) + ' ') {
+    if (c == ' ' && text.ends_with(',')) text.replace(text.size() - 1, 1, "\\x2C");
+    text += c;
+  }
+  text.pop_back();
+  return text;
+}
+
 std::set<std::string> cells_fitted_to(std::string_view text) {
   constexpr std::string_view begin = "# They are";
   std::set<std::string> cells;
@@ -77,7 +87,7 @@ std::set<std::string> cells_fitted_to(std::string_view text) {
     while (!line.empty()) {
       const std::size_t comma = std::min(line.find(", "), line.size() - listing);
       std::string_view cell = line.substr(0, comma);
-      while (cell.starts_with(' ')) cell.remove_prefix(1);
+      if (cell.starts_with(' ')) cell.remove_prefix(1);
       cells.emplace(cell);
       line.remove_prefix(std::min(comma + 1, line.size()));
     }

@@ -27,7 +27,11 @@ void tell_doubts(const lsystem::Grammar& grammar, Console& console);
 /// that says so.
 repository::TextsByName distributions_of(const lsystem::Grammar& grammar);
 
-/// The cells that a model was fitted to, as its first lines say (`# They are a, b,` and more such lines), escaped; none when they do not.
+/// The name of a cell as it stands in a list: escaped, and commas that would end it are \x2C.
+std::string listed(const std::string& cell);
+
+/// The cells that a model was fitted to, as its first lines say (`# They are a, b,` and more such lines), each as listed() writes it;
+/// none when they do not.
 std::set<std::string> cells_fitted_to(std::string_view text);
 
 /// What NAME or NAME@version names.

@@ -292,7 +292,7 @@ std::vector<std::string> known_to(const lsystem::Grammar& grammar, const Sample&
   const std::set<std::string> known = cells_fitted_to(grammar.text);
   std::vector<std::string> cells;
   for (const std::string& cell : judged_by.cells)
-    if (known.contains(repository::escaped(cell))) cells.push_back(repository::escaped(cell));
+    if (known.contains(listed(cell))) cells.push_back(repository::escaped(cell));
   return cells;
 }
 void warn_of_known(const std::vector<std::string>& known, const Sample& judged_by, Console& console) {

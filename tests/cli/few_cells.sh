@@ -55,6 +55,16 @@ told insects.json "d['cells']['traced'] == 4"
 
 "$program" judge --train insects --kind axon --model insects.lsys --count 19 --repeats 2 >out.txt 2>err.txt
 grep -qF 'was fitted to 4 of the 4 cells that it is judged by, fly0 first' err.txt || fail "a model is judged by its own cells without a word"
+
+# Names with what stands between names are told from one another, and from a list.
+mkdir odd && cp insects/fly0.swc 'odd/L5, tuft.swc' && cp insects/fly1.swc 'odd/ L5,.swc' && cp insects/fly2.swc odd/tuft,2.swc
+cp insects/fly3.swc 'odd/L5\x2C tuft.swc'
+"$program" fit odd --kind axon -o odd.lsys >/dev/null
+"$program" judge --train odd --kind axon --model odd.lsys --count 19 --repeats 2 --json >odd.json 2>/dev/null
+told odd.json "d['fitted_to'] == 4"
+mkdir others && for i in 0 1 2 3; do cp insects/fly$i.swc "others/$(echo 'L5|tuft|2|L5,' | cut -d'|' -f$((i + 1))).swc"; done
+"$program" judge --train others --kind axon --model odd.lsys --count 19 --repeats 2 --json >others.json 2>/dev/null
+told others.json "d['fitted_to'] == 0"
 mkdir twice && cp insects/fly0.swc twice/a.swc && cp insects/fly0.swc twice/b.swc && cp insects/fly1.swc twice
 "$program" fit twice --kind axon -o twice.lsys >/dev/null 2>err.txt
 grep -qF '1 cell of twice is there twice, first b is a' err.txt || fail "copies are fitted to without a word"
