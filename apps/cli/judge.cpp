@@ -460,6 +460,8 @@ std::function<void()> judge(CLI::App& command, Console& console) {
     if (command.count("--populations") && (options->model.empty() || options->held_out.empty()))
       throw CLI::ValidationError(
           "--populations is how many a --model grows beside --held-out cells; leave it out without these");
+    if (command.count("--burke") && options->held_out.empty())
+      throw CLI::ValidationError("--burke is judged beside --held-out cells; leave it out without these");
     if (options->count && !options->grown.empty())
       throw CLI::ValidationError("--count is how many neurons a model grows; leave it out with --grown");
   });

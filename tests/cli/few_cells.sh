@@ -74,4 +74,5 @@ refuses 'at least 19' "$program" judge --train insects --kind axon --count 5
 refuses 'has a section of kind dendrite' "$program" judge --train insects --kind dendrite --count 19
 fails_with 2 '--model or --grown' "$program" judge --train insects --held-out few
 fails_with 2 '--count' "$program" judge --train insects --grown grown --count 20
+fails_with 2 '--burke' "$program" judge --train insects --leave-one-out --burke grown
 fails_with 2 '--held-out' "$program" judge --train insects --held-out few --leave-one-out
