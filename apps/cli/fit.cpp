@@ -65,6 +65,9 @@ void look_for_slips(const Sample& sample, statistics::KindSet kinds, Console& co
         with, counted(sample.neurons.size(), "neuron"), with == 1 ? "has" : "have", first));
 }
 
+/// Whether chance is in what is fitted.
+bool draws(const Options& options) { return !options.form.empty() || options.calibrate; }
+
 /// By what the model was fitted, how, and to which neurons: comments that the text begins with.
 std::string provenance(const Options& options, const Sample& sample) {
   std::string how = fmt::format("--kind {}", fmt::join(options.kinds, " "));
@@ -76,6 +79,7 @@ std::string provenance(const Options& options, const Sample& sample) {
     if (options.calibrate) how += fmt::format(" --calibrate --candidates {}", options.calibration.candidates);
     if (!options.slices.empty()) how += fmt::format(" --slices '{}'", repository::escaped(options.slices));
   }
+  if (draws(options)) how += fmt::format(" --seed {}", options.calibration.seed);
   std::string text =
       fmt::format("# Fitted by brainforest {} to {} of {}: fit {}\n", FOREST_VERSION,
                   counted(sample.cells.size(), "neuron"), repository::escaped(sample.name), how);
@@ -147,7 +151,8 @@ void run(const Options& options, Console& console) {
   const std::string title = fmt::format("neurons like those of {}", of);
   fitting::Calibrated fitted;
   if (!options.form.empty()) {
-    fitted.text = parametric_grammar(options.form, neurons, title, resampling.kinds, 1, console);
+    fitted.text =
+        parametric_grammar(options.form, neurons, title, resampling.kinds, calibration.seed, console);
   } else {
     try {
       fitted = fitting::calibrated_grammar(neurons, slices_of(sample, options.slices, console), title,
@@ -208,11 +213,12 @@ std::function<void()> fit(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
   CLI::Option_group* from = command.add_option_group("from", "what is fitted");
   from->add_option("files", options->files, "Files or folders of traced neurons");
-  CLI::Option* population =
-      from->add_option("--population", options->population, "A population of the repository");
-  from->require_option(1);
+  CLI::Option* population = from->add_option(
+      "--population", options->population,
+      "A population of the repository; beside files, that which the model is said to describe");
+  from->require_option(1, 2);
   CLI::Option* repo = command.add_option("--repo", options->repo, "The repository");
-  population->needs(repo);
+  must_be_name(*population->needs(repo));
   CLI::Option_group* into = command.add_option_group("into", "where the model goes");
   CLI::Option* model = into->add_option("--model", options->model, "Its name in the repository");
   must_be_name(*model->needs(repo));
@@ -255,7 +261,17 @@ std::function<void()> fit(CLI::App& command, Console& console) {
       ->needs(calibrate)
       ->capture_default_str();
   add_slices(command, options->slices)->needs(calibrate);
+  add_seed(command, options->calibration.seed,
+           "The same seed fits the same model, where chance is in it: with --form and --calibrate");
   add_force(command, options->force);
+  command.parse_complete_callback([options, &command] {
+    if (command.count("--seed") && !draws(*options))
+      throw CLI::ValidationError(
+          "--seed is of --form and --calibrate; nothing is drawn without one of these");
+    if (!options->files.empty() && !options->population.empty() && options->model.empty())
+      throw CLI::ValidationError(
+          "--population beside files is of the --model that is stored; give that, too");
+  });
   return [options, &console] { run(*options, console); };
 }
 

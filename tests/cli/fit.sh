@@ -26,7 +26,7 @@ calibration = json.load(open("tasting.json"))["calibration"]
 assert calibration["gap_after"] <= calibration["gap_before"], calibration
 assert calibration["rounds"] > 0 and calibration["tastes"] > 20 and calibration["candidates"] == 3, calibration
 PY
-grep -q '^# Fitted by brainforest .* to 12 neurons of traced: fit --kind dendrite .* --calibrate --candidates 3$' tasting.lsys
+grep -q '^# Fitted by brainforest .* to 12 neurons of traced: fit --kind dendrite .* --calibrate --candidates 3 --seed 1$' tasting.lsys
 grep -q '^# They are .*motoneuron-1-00000' tasting.lsys
 for model in tasting like_them; do sed 1d $model.lsys >$model.rest; done
 head -c "$(stat -c %s like_them.rest)" tasting.rest | cmp - like_them.rest
@@ -83,13 +83,23 @@ refuses "model 'like_traced' has no distribution 'nothing'; it has " $BRAINFORES
 # Published forms are models of the same kind: fitted, stored, grown.
 for form in burke hillman; do
   $BRAINFOREST fit traced --form $form -o $form.lsys >/dev/null 2>&1
-  grep -q "^# Fitted by brainforest .* --kind dendrite --form $form$" $form.lsys
+  grep -q "^# Fitted by brainforest .* --kind dendrite --form $form --seed 1$" $form.lsys
+  $BRAINFOREST fit traced --form $form --seed 1 -o $form-1.lsys >/dev/null 2>&1
+  $BRAINFOREST fit traced --form $form --seed 2 -o $form-2.lsys >/dev/null 2>&1
+  cmp $form.lsys $form-1.lsys
+  ! cmp -s <(sed 1d $form.lsys) <(sed 1d $form-2.lsys)
   $BRAINFOREST fit --repo cells.db --population traced --form $form --model $form >/dev/null 2>&1
   $BRAINFOREST model list --repo cells.db | grep -q "^$form "
   $BRAINFOREST grow --repo cells.db --model $form --count 3 --seed 1 --out by_$form >/dev/null
   [ "$(ls by_$form | wc -l)" = 3 ]
 done
 fails_with 2 'excludes' $BRAINFOREST fit traced --form burke --calibrate -o both.lsys
+fails_with 2 'nothing is drawn' $BRAINFOREST fit traced --seed 2 -o both.lsys
+
+# Fitted to files, a model is said to describe the population that is named.
+$BRAINFOREST fit traced --model of_files --repo cells.db --population rats >/dev/null
+$BRAINFOREST model list --repo cells.db --population rats | grep -q '^of_files .* rats .*fitted to 12 neurons of traced'
+fails_with 2 '--model' $BRAINFOREST fit traced -o both.lsys --repo cells.db --population rats
 
 # Axons that never fork keep to one tip.
 cp -r traced stubs
