@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/lsystem/grammar.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -161,6 +163,8 @@ TEST(Expression, DistributionsHaveTheirMomentsAndLimits) {
       {"vonmises(0, 4)", 0, 979.026},
       {"poisson(4.5)", 4.5, 4.5},
       {"poisson(70)", 70, 70},
+      {"poisson(1001)", 1001, 1001},
+      {"poisson(1000000)", 1e6, 1e6},
       {"chance(0.3)", .3, .21},
   };
   for (const Drawing& d : drawings) {
@@ -175,6 +179,27 @@ TEST(Expression, DistributionsHaveTheirMomentsAndLimits) {
     const double mean = sum / count;
     EXPECT_NEAR(mean, d.mean, 5 * std::sqrt(d.variance / count)) << d.expression;
     EXPECT_NEAR((squares / count - mean * mean) / d.variance, 1., .08) << d.expression;
+  }
+}
+
+// How often each count comes, on both sides of where another method takes over.
+TEST(Expression, PoissonCountsComeAsOftenAsTheyShould) {
+  for (const double mean : {999.5, 1000.5, 30'000.}) {
+    const Grammar g = parse(fmt::format("axiom: A\ng: A -> B(poisson({}))\n", mean), "test");
+    Deriver deriver(g);
+    constexpr int draws = 40'000, bins = 24;
+    // Bins a quarter of a standard deviation wide; the first and last hold what lies beyond.
+    const double width = std::round(std::sqrt(mean) / 4.), low = std::floor(mean) - width * bins / 2;
+    const auto bin = [&](double count) {
+      return std::size_t(std::clamp((count - low) / width, 0., bins - 1.));
+    };
+    std::vector<double> seen(bins), expected(bins);
+    for (int i = 0; i < draws; ++i) ++seen[bin(deriver.derive(3, std::uint64_t(i), 1).parameters[0])];
+    for (double count = std::floor(mean / 2.); count < 2. * mean; ++count)
+      expected[bin(count)] += draws * std::exp(count * std::log(mean) - mean - std::lgamma(count + 1.));
+    double chi2 = 0.;
+    for (std::size_t i = 0; i < bins; ++i) chi2 += std::pow(seen[i] - expected[i], 2) / expected[i];
+    EXPECT_LT(chi2, 49.73) << mean;  // 23 degrees of freedom, p = .001
   }
 }
 

@@ -83,10 +83,26 @@ double chance(Random& random, double p) {
   return p >= 0. && p <= 1. ? double(random.uniform() < p) : nonsense;
 }
 
+// Hörmann 1993, "The transformed rejection method for generating Poisson random variables": PTRS, for means from 10 on.
+double poisson_of_many(Random& random, double mean) {
+  const double b = .931 + 2.53 * std::sqrt(mean), a = -.059 + .02483 * b, alpha = 1.1239 + 1.1328 / (b - 3.4),
+               surely = .9277 - 3.6224 / (b - 2.), log_mean = std::log(mean);
+  for (;;) {
+    const double u = random.uniform() - .5, v = 1. - random.uniform(), near = .5 - std::abs(u);
+    if (near == 0.) continue;
+    const double count = std::floor((2. * a / near + b) * u + mean + .43);
+    if (near >= .07 && v <= surely) return count;
+    if (count < 0. || (near < .013 && v > near)) continue;
+    if (std::log(v * alpha / (a / (near * near) + b)) <= count * log_mean - mean - std::lgamma(count + 1.))
+      return count;
+  }
+}
+
 // Knuth 1969, in pieces of at most 32 so that the product does not vanish.
 double poisson(Random& random, double mean) {
-  constexpr double most = 1e6;  // which takes a while
+  constexpr double many = 1000., most = 1e6;
   if (!(mean >= 0. && mean <= most)) return nonsense;
+  if (mean > many) return poisson_of_many(random, mean);
   double count = 0.;
   for (double left = mean; left > 0.; left -= 32.) {
     const double bound = std::exp(-std::min(left, 32.));
