@@ -11,6 +11,7 @@
 #include "forest/circuit/environment.h"
 #include "forest/core/error.h"
 #include "forest/io/sonata.h"
+#include "forest/repository/names.h"
 
 #include "apps/cli/console.h"
 #include "apps/cli/options.h"
@@ -83,6 +84,7 @@ Surroundings::Surroundings(const EnvironmentOptions& options, Console& console) 
     throw InputError(options.file, 0,
                      "where in it the neurons grow is not said; give --at X,Y,Z or --depth UM");
   site_.environment = &environment_;
+  site_.name = repository::escaped(options.file);
   if (!options.at.empty()) {
     site_.at = *place_of(options.at);
   } else {

@@ -106,7 +106,8 @@ void grow_in_place(Planted& planted, const circuit::Recipe& recipe,
   parallel_for(index.size(), 1, [&](std::size_t i) {
     const circuit::Instance& instance = circuit.instances[i];
     if (const auto& own = seedlings[instance.type])
-      grown[i] = centred(lsystem::grow(own->grammar, seed, index[i], {&environment, instance.position}));
+      grown[i] = centred(
+          lsystem::grow(own->grammar, seed, index[i], {&environment, instance.position, recipe.name}));
     progress.advance();
   });
   progress.end();

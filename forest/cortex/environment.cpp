@@ -7,6 +7,7 @@
 #include <string>
 
 #include "forest/core/error.h"
+#include "forest/core/hash.h"
 
 namespace forest::cortex {
 namespace {
@@ -27,11 +28,24 @@ int number_in(const std::string& name) {
 }
 
 bool within(float number) { return std::abs(number) <= float(Environment::far_away); }  // not of NaN
+std::string hash_of(std::span<const Slab> layers, std::span<const Sphere> somata,
+                    std::span<const Attractor> attractors) {
+  std::vector<float> numbers;
+  std::string names;
+  const auto add = [&](const Vec3& at) { numbers.insert(numbers.end(), at.data(), at.data() + 3); };
+  for (const Slab& l : layers) names += l.name + '\n', numbers.insert(numbers.end(), {l.bottom, l.top});
+  for (const Sphere& s : somata) add(s.centre), numbers.push_back(s.radius);
+  for (const Attractor& a : attractors) add(a.at), numbers.insert(numbers.end(), {a.strength, a.reach});
+  names += std::to_string(layers.size()) + ' ' + std::to_string(somata.size()) + '\n';
+  names.append(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(float));
+  return hash_hex(std::as_bytes(std::span(names)));
+}
+
 bool within(const Vec3& place) { return within(place.x()) && within(place.y()) && within(place.z()); }
 
 }  // namespace
 
-Environment::Environment() : first_(2, 0) {}
+Environment::Environment() : hash_(hash_of({}, {}, {})), first_(2, 0) {}
 
 Environment::Environment(std::vector<Slab> layers, std::vector<Sphere> somata,
                          std::vector<Attractor> attractors)
@@ -57,6 +71,7 @@ Environment::Environment(std::vector<Slab> layers, std::vector<Sphere> somata,
       throw Error("attractor " + std::to_string(i + 1) +
                   " needs a place, a strength and a reach above 0 that are finite numbers");
   }
+  hash_ = hash_of(layers_, somata_, attractors_);
   first_.assign(2, 0);
   if (somata_.empty()) return;
 

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "forest/core/bounds.h"
@@ -44,6 +45,8 @@ class Environment {
   std::span<const Slab> layers() const { return layers_; }
   std::span<const Sphere> somata() const { return somata_; }
   std::span<const Attractor> attractors() const { return attractors_; }
+  /// The same for environments in which there is the same, wherever they were read; for the provenance of what grows in it.
+  const std::string& hash() const { return hash_; }
 
   /// Below the pia, µm; above it negative. Without a pia: far_away.
   double depth(const Place& place) const;
@@ -96,6 +99,7 @@ class Environment {
 
   std::vector<Slab> layers_;
   std::vector<int> numbers_;  // of layers
+  std::string hash_;
   std::vector<Sphere> somata_;
   std::vector<Attractor> attractors_;
   // A grid over the centres of the somata: those of cell c are order_[first_[c]] to order_[first_[c + 1]].
@@ -109,6 +113,7 @@ class Environment {
 struct Site {
   const Environment* environment = nullptr;  // none: nothing around it
   Vec3 at = Vec3::Zero();
+  std::string name = {};  // of the environment, for people
 };
 
 }  // namespace forest::cortex

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <set>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -22,6 +25,7 @@ namespace {
 
 using cortex::Environment;
 using cortex::Site;
+using cortex::Slab;
 
 Grammar shipped(const std::string& name) {
   return parse_file(std::string(FOREST_SOURCE_DIR) + "/data/grammars/" + name + ".lsys");
@@ -90,6 +94,38 @@ TEST(Questions, SilentBranchesAreSkippedAndNothingElse) {
             std::vector<double>{1193});
   EXPECT_EQ(told("axiom: A(0) [ ?D(0) F(3) ]\np: A(x) > [ ?D(d) ] -> F(10) A(d)\n", "A", site, 3),
             std::vector<double>{1180});
+}
+
+// The hash is of what is in an environment: one more thing, or one elsewhere, is another.
+TEST(Environments, WhatGrewSaysInWhich) {
+  const Grammar g = parse("axiom: F(1)\np: z -> z\n", "g");
+  const auto told = [&](const Environment* e, const std::string& key) {
+    for (const auto& [k, value] : grow(g, 1, 2, {e, {3, 4, 5}, "column"}).annotations())
+      if (k == key) return value;
+    return std::string();
+  };
+  EXPECT_EQ(told(nullptr, "environment") + told(nullptr, "environment_hash") + told(nullptr, "grown_at"), "");
+  const Slab layer{"L1", 0.f, 10.f};
+  const Sphere soma{{1, 2, 3}, 4.f};
+  const cortex::Attractor attractor{.at = {1, 2, 3}};
+  const Environment all[] = {Environment(),
+                             Environment({layer}),
+                             Environment({{"L2", 0.f, 10.f}}),
+                             Environment({{"L1", 0.f, 11.f}}),
+                             Environment({layer}, {soma}),
+                             Environment({layer}, {{{1, 2, 4}, 4.f}}),
+                             Environment({}, {soma}),
+                             Environment({layer}, {soma}, {attractor}),
+                             Environment({layer}, {}, {attractor}),
+                             Environment({layer}, {soma}, {{.at = {1, 2, 3}, .reach = 7.f}})};
+  std::set<std::string> hashes;
+  for (const Environment& e : all) {
+    EXPECT_EQ(told(&e, "environment"), "column");
+    EXPECT_EQ(told(&e, "grown_at"), "3, 4, 5");
+    hashes.insert(told(&e, "environment_hash"));
+  }
+  EXPECT_EQ(hashes.size(), std::size(all));
+  EXPECT_EQ(Environment({layer}, {soma}, {attractor}).hash(), all[7].hash());
 }
 
 Vec3 last_heading(const std::string& axiom, const Site& site) {

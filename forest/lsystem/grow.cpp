@@ -22,8 +22,11 @@ Annotations source(const Grammar& grammar, std::uint64_t seed, std::uint64_t ind
                    const cortex::Site& site) {
   Annotations list{
       {"grammar", grammar.name}, {"seed", std::to_string(seed)}, {"index", std::to_string(index)}};
-  if (site.environment)
+  if (site.environment) {
     list.emplace_back("grown_at", fmt::format("{}, {}, {}", site.at.x(), site.at.y(), site.at.z()));
+    if (!site.name.empty()) list.emplace_back("environment", site.name);
+    list.emplace_back("environment_hash", site.environment->hash());
+  }
   return list;
 }
 

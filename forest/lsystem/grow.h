@@ -17,7 +17,8 @@ namespace forest::lsystem {
 
 class Deriver;
 
-/// The neuron `index` of the population `seed`: a pure function. It says in its annotations where it comes from. Throws as Deriver::derive and interpret do.
+/// The neuron `index` of the population `seed`: a pure function. It says in its annotations where it comes from: grammar, seed and index, and in
+/// an environment also grown_at, environment (its name) and environment_hash. Throws as Deriver::derive and interpret do.
 Morphology grow(const Grammar& grammar, std::uint64_t seed, std::uint64_t index,
                 const cortex::Site& site = {});
 

@@ -43,7 +43,8 @@ struct Traced {
   bool operator==(const Traced&) const = default;
 };
 
-/// Grown from a grammar: the same grammar, seed and index grow the same neuron again.
+/// Grown from a grammar: the same grammar, seed and index grow the same neuron again; what grew in an environment, where it asks what
+/// is around, in the same one at the same place, which its annotations name (lsystem/grow.h).
 struct Grown {
   std::string grammar;       // its name
   std::string grammar_hash;  // what Repository::add_grammar returned

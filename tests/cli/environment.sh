@@ -14,7 +14,18 @@ done
 $BRAINFOREST grow --grammar tufted --environment "$cortex" --at 0,700,0 --count 4 --seed 3 --out at >/dev/null
 diff -r d1500 at
 grep -q 'grown_at.*0, 700, 0' at/tufted-3-00000.swc
+grep -q 'environment.*cortex.toml' at/tufted-3-00000.swc
 $BRAINFOREST grow --grammar tufted --count 4 --seed 3 --out nowhere >/dev/null
+[ "$(cat nowhere/*.swc | grep -c 'grown_at\|environment')" = 0 ]
+# The hash is of what is in it: the same under another name, another where anything is moved.
+hash_in() { grep -h 'environment_hash' "$1"/*.swc | sort -u; }
+sed 's/^# .*//' "$cortex" >same.toml
+sed '0,/^thickness = [0-9]*/s//&.5/' "$cortex" >other.toml
+for file in same other; do $BRAINFOREST grow --grammar tufted --environment $file.toml --at 0,700,0 --seed 3 --out in_$file --repo env.db --population $file >/dev/null; done
+[ "$(hash_in at)" = "$(hash_in in_same)" ]
+[ "$(hash_in at)" != "$(hash_in in_other)" ]
+$BRAINFOREST show tufted-3-00000 --repo env.db --population same >shown.txt
+grep -q 'environment *same.toml' shown.txt
 $BRAINFOREST grow --grammar tufted --environment column-1000 --depth 900 --seed 3 --out recipe >/dev/null
 cat >reach.py <<'PY'
 import glob, sys
