@@ -171,9 +171,9 @@ TEST(Exclusion, NoneEntersTheOutlineOfItsOwnSoma) {
                                           a2, b2, a3, b3, 40. * std::cos(from), 40. * std::sin(from),
                                           -std::cos(from + .07), -std::sin(from + .07)),
                               "outlined");
-      const auto points = interpret(derive(g, 0, 0), g).points();
-      ASSERT_EQ(points.size(), 61u);
-      for (const Point& p : points) {
+      const Morphology m = interpret(derive(g, 0, 0), g);
+      ASSERT_EQ(m.points().size(), 61u);
+      for (const Point& p : m.points()) {
         const double phi = std::atan2(double(p.y), double(p.x));
         const double outline = 10. * (1. + a2 * std::cos(2. * phi) + b2 * std::sin(2. * phi) +
                                       a3 * std::cos(3. * phi) + b3 * std::sin(3. * phi));
