@@ -100,7 +100,8 @@ TEST(Questions, SilentBranchesAreSkippedAndNothingElse) {
 TEST(Environments, WhatGrewSaysInWhich) {
   const Grammar g = parse("axiom: F(1)\np: z -> z\n", "g");
   const auto told = [&](const Environment* e, const std::string& key) {
-    for (const auto& [k, value] : grow(g, 1, 2, {e, {3, 4, 5}, "column"}).annotations())
+    const Morphology m = grow(g, 1, 2, {e, {3, 4, 5}, "column"});
+    for (const auto& [k, value] : m.annotations())
       if (k == key) return value;
     return std::string();
   };
