@@ -79,9 +79,7 @@ double von_mises(Random& random, double mean, double concentration) {
   return concentration >= 0. ? random.von_mises(mean, concentration) : nonsense;
 }
 
-double chance(Random& random, double p) {
-  return p >= 0. && p <= 1. ? double(random.uniform() < p) : nonsense;
-}
+double chance(Random& random, double p) { return std::isnan(p) ? nonsense : double(random.uniform() < p); }
 
 // Hörmann 1993, "The transformed rejection method for generating Poisson random variables": PTRS, for means from 10 on.
 double poisson_of_many(Random& random, double mean) {
