@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <map>
 #include <string>
+#include <utility>
 
 #include <CLI/App.hpp>
 #include <fmt/format.h>
@@ -110,16 +111,19 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   return drawn;
 }
 
-std::string Artist::explain(const scene::View& view, const Marks& marks, frame::Image& image) const {
-  std::string missing;
-  if (marks.scale && !scene::paint_scale(image, view.camera, view.background)) missing = "scale bar";
-  if (marks.names && marks.cells && scene::is_gallery(forest_)) scene::paint_names(image, forest_, view);
+Artist::Words Artist::words(const scene::View& view, const Marks& marks,
+                            const frame::Viewport& picture) const {
+  Words words;
+  const auto add = [&](std::optional<scene::Block> block) {
+    if (block) words.blocks.push_back(std::move(*block));
+    return block.has_value();
+  };
   std::vector<scene::ColourBar> bars;
   if (marks.legend && playback_)
     bars.push_back(scene::bar_of(*playback_, view.activity.value_or(playback_->view()), view.background));
   if (const auto of_surfaces = scene::bar_of(dressing_.surfaces); marks.legend && of_surfaces)
     bars.push_back(*of_surfaces);
-  const bool barred = scene::paint(image, bars, view.background);
+  const bool barred = add(scene::block_of(bars, picture, view.background));
   std::vector<scene::LegendEntry> names;
   if (marks.names && colouring_ && !playback_)
     names = colouring_->legend;  // else the simulation's colours are shown
@@ -129,15 +133,39 @@ std::string Artist::explain(const scene::View& view, const Marks& marks, frame::
   if ((marks.names || playback_) && marks.legend && with_synapses &&
       (playback_ || view.synapses == scene::SynapseColour::sign))
     std::ranges::move(scene::synapse_legend(view.background), std::back_inserter(names));
+  const bool named = add(scene::block_of(names, picture, view.background));
+  const bool scaled = marks.scale && add(scene::scale_block(view.camera, picture, view.background));
+  std::vector<const char*> no_room;
+  if (marks.scale && !scaled) no_room.push_back("scale bar");
+  if (marks.names && !names.empty() && !named) no_room.push_back("legend");
   if (marks.names && !playback_ && names.empty() && !barred)
-    return forest_.instances().empty() && !dressing_.surfaces.empty()
-               ? "a legend names colours of neurons, areas and values, and there are none"
-               : "the colours of neurons mean nothing here, so there is no legend";
-  if (!names.empty() && !scene::paint(image, names, view.background, barred) && marks.names)
-    missing += missing.empty() ? "legend" : " nor a legend";
-  return missing.empty()
-             ? missing
-             : fmt::format("the picture has no room for a {}; draw it larger, by --size", missing);
+    words.missing = forest_.instances().empty() && !dressing_.surfaces.empty()
+                        ? "a legend names colours of neurons, areas and values, and there are none"
+                        : "the colours of neurons mean nothing here, so there is no legend";
+  else if (!no_room.empty())
+    words.missing = fmt::format("the picture has no room for a {}; draw it larger, by --size",
+                                fmt::join(no_room, " nor a "));
+  return words;
+}
+
+void Artist::name_cells(const scene::View& view, const Marks& marks, frame::Image& image) const {
+  if (marks.names && marks.cells && scene::is_gallery(forest_)) scene::paint_names(image, forest_, view);
+}
+
+std::string Artist::explain(const scene::View& view, const Marks& marks, frame::Image& image,
+                            scene::Arrangement& places) const {
+  name_cells(view, marks, image);
+  const Words all = words(view, marks, {float(image.width), float(image.height)});
+  places.paint(image, scene::paper_of(view.background), all.blocks);
+  return all.missing;
+}
+
+bool Artist::look_at(const scene::View& view, const Marks& marks, frame::Image& image,
+                     scene::Arrangement& places) const {
+  name_cells(view, marks, image);
+  const Words all = words(view, marks, {float(image.width), float(image.height)});
+  places.look_at(image, scene::paper_of(view.background), all.blocks);
+  return !all.blocks.empty();
 }
 
 FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& plan,
@@ -148,7 +176,7 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
   std::uint64_t segments = 0;
   const double picture_ms = plan.rate / plan.frames_per_second;
   artist.set_window(picture_ms);
-  for (int i = 0; i < count; ++i) {
+  const auto view_at = [&](int i) {
     scene::View view = path.at(count > 1 ? float(i) / float(count - 1) : 0.f);
     plan.look.put_on(view);
     view.targets.insert(view.targets.end(), plan.targets.begin(), plan.targets.end());
@@ -159,9 +187,24 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
       view.activity = activity;
       view.activity->time = plan.from + i * picture_ms;
     }
+    return view;
+  };
+  // Words stand where they hide least in all of it: of that a few moments tell, drawn quickly.
+  constexpr int looks = 16;
+  scene::Arrangement places;
+  for (int look = 0, last = -1; look < looks; ++look) {
+    const int i = (2 * look + 1) * count / (2 * looks);
+    if (i == std::exchange(last, i)) continue;
+    scene::View view = view_at(i);
+    view.samples = 1, view.skin = false;
+    frame::Image image = artist.draw(view, plan.width, plan.height).image;
+    if (!artist.look_at(view, plan.marks, image, places)) break;
+  }
+  for (int i = 0; i < count; ++i) {
+    const scene::View view = view_at(i);
     Drawn drawn = artist.draw(view, plan.width, plan.height, {.outline = plan.outline});
     segments += drawn.segments;
-    artist.explain(view, plan.marks, drawn.image);
+    artist.explain(view, plan.marks, drawn.image, places);
     reel.add(drawn.image);
   }
   if (segments && reel.covered() == 0.)

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "forest/core/progress.h"
+#include "forest/scene/arrangement.h"
 #include "forest/scene/chooser.h"
 #include "forest/scene/path.h"
 #include "forest/scene/playback.h"
@@ -77,8 +78,14 @@ class Artist {
     return dressing_.still_samples(view, scene::colour(targets_, view));
   }
   /// Draws into a picture how it is to be read. Small pictures stay as they are.
+  /// @param places  where the words stand, in a film the same from picture to picture
   /// @return  what was asked for and is not in it, a sentence; or nothing
-  std::string explain(const scene::View& view, const Marks& marks, frame::Image& image) const;
+  std::string explain(const scene::View& view, const Marks& marks, frame::Image& image,
+                      scene::Arrangement& places) const;
+  /// Has a look at a picture for whose like places are sought. It is drawn on.
+  /// @return  whether there is anything to place
+  bool look_at(const scene::View& view, const Marks& marks, frame::Image& image,
+               scene::Arrangement& places) const;
   /// From now on branches show the simulation, at the time of View::activity.
   void play(scene::Playback playback) { playback_.emplace(std::move(playback)); }
   /// From now on these surfaces are in the pictures, too.
@@ -99,6 +106,13 @@ class Artist {
   bool on_card() const { return !renderer_->image(); }
 
  private:
+  struct Words {
+    std::vector<scene::Block> blocks;
+    std::string missing;  // as explain returns it
+  };
+  Words words(const scene::View& view, const Marks& marks, const frame::Viewport& picture) const;
+  void name_cells(const scene::View& view, const Marks& marks, frame::Image& image) const;
+
   scene::Forest forest_;
   scene::Targets targets_;
   scene::Chooser chooser_;

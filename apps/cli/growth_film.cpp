@@ -13,7 +13,7 @@
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 #include "forest/io/format.h"
-#include "forest/scene/colour_bar.h"
+#include "forest/scene/arrangement.h"
 #include "forest/scene/gallery.h"
 
 #include "apps/cli/reel.h"
@@ -77,12 +77,19 @@ std::vector<Morphology> at_step(const Growth& growth, Step step) {
   return neurons;
 }
 
-void write_step(frame::Image& image, Step step, scene::Background background) {
-  const scene::Writing writing = scene::writing_in(image, background);
-  const float h = writing.letters.height;
+scene::Block block_of(Step step, const frame::Viewport& picture, scene::Background background) {
+  constexpr float padding = 1.1f, margin = 1.6f;  // heights of a letter
+  const scene::Lettering letters = scene::letters_in(picture, background);
+  const float h = letters.height;
   const std::string text = fmt::format("step {}", step);
-  writing.letters.write(image, text, float(image.width) - 2.7f * h - writing.letters.width(text),
-                        float(image.height) - 2.7f * h);
+  return {scene::Block::step,
+          scene::Spot::bottom_right,
+          letters.width(text) + 2.f * h * padding,
+          h * (1.f + 2.f * padding),
+          h * margin,
+          [=](frame::Image& image, float left, float top) {
+            letters.write(image, text, left + h * padding, top + h * (1.f + padding));
+          }};
 }
 
 }  // namespace
@@ -104,8 +111,8 @@ FilmFigures film_growth(std::span<const std::filesystem::path> folders, const Fi
 
   const float aspect = float(plan.width) / float(plan.height);
   const std::vector<Morphology> whole = at_step(growth, ended);
-  const std::vector<Vec3> places = scene::places_in_gallery(whole, aspect);
-  const scene::Forest forest = scene::hung(whole, names, places);
+  const std::vector<Vec3> somata = scene::places_in_gallery(whole, aspect);
+  const scene::Forest forest = scene::hung(whole, names, somata);
   scene::View view = scene::overview(forest, aspect);
   plan.look.put_on(view);
   view.targets = plan.targets;
@@ -117,18 +124,29 @@ FilmFigures film_growth(std::span<const std::filesystem::path> folders, const Fi
   frame::Image image;
   std::size_t drawn = steps.size() + 1;
   std::string renderer;
+  const frame::Viewport picture{float(plan.width), float(plan.height)};
+  const scene::Paper paper = scene::paper_of(view.background);
+  scene::Arrangement places;  // beside what they became
+  const auto draw = [&](const scene::Forest& grown, auto explain) {
+    Artist artist(grown, drawer);
+    renderer = artist.renderer();
+    image = artist.draw(view, plan.width, plan.height).image;
+    if (marks.names) scene::paint_names(image, forest, view);  // where they stay
+    (artist.*explain)(view, marks, image, places);
+  };
+  draw(forest, &Artist::look_at);
+  const scene::Block last_step = block_of(steps.back(), picture, view.background);
+  places.look_at(image, paper, {&last_step, 1});
   for (int i = 0; i < reel.count(); ++i) {
     const float time = float(i) / std::max(1.f, grown * float(reel.count()));
     const std::size_t now = std::min(std::size_t(time * float(steps.size())), steps.size() - 1);
     const bool last = time >= 1.f;
     const std::size_t wanted = last ? steps.size() : now;
     if (drawn != wanted) {
-      Artist artist(scene::hung(last ? whole : at_step(growth, steps[now]), names, places), drawer);
-      image = artist.draw(view, plan.width, plan.height).image;
-      artist.explain(view, marks, image);
-      if (marks.names) scene::paint_names(image, forest, view);  // where they stay
-      write_step(image, steps[now], view.background);
-      drawn = wanted, renderer = artist.renderer();
+      draw(last ? forest : scene::hung(at_step(growth, steps[now]), names, somata), &Artist::explain);
+      const scene::Block step = block_of(steps[now], picture, view.background);
+      places.paint(image, paper, {&step, 1});
+      drawn = wanted;
     }
     reel.add(image);
   }

@@ -188,7 +188,9 @@ std::function<void()> render(CLI::App& command, Console& console) {
     Drawn drawn =
         artist.draw(view, width, height, {.outline = options->outline, .progress = &console.progress()});
     if (drawn.image.covered == 0.) console.warn(nothing_shown(artist, drawn));
-    if (const std::string missing = artist.explain(view, options->marks, drawn.image); !missing.empty())
+    scene::Arrangement places;
+    if (const std::string missing = artist.explain(view, options->marks, drawn.image, places);
+        !missing.empty())
       console.warn(missing);
     io::write_png(options->out, width, height, drawn.image.pixels);
     nlohmann::ordered_json activity;

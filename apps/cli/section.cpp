@@ -87,12 +87,17 @@ void film(const Options& options, const scene::Forest& forest, const Plane& plan
           const scene::Colouring& colouring, const scene::SlicePicture& picture, Console& console) {
   const int count = std::max(2, int(std::lround(options.seconds * options.rate)));
   io::Film film(options.out, picture.width_pixels, picture.height_pixels, options.rate);
+  const auto slice_at = [&](float share) {
+    return scene::visible(scene::slice(forest, plane.moved(float(options.depth) * share), picture.sheet()),
+                   colouring);
+  };
+  constexpr int looks = 8;
+  scene::Arrangement places;  // of the scale bar, where it hides least in all of the film
+  for (int i = 0; i < looks; ++i)
+    scene::look_at(slice_at((float(i) + .5f) / float(looks)), colouring, picture, places);
   console.progress().begin("filming", std::size_t(count));
   for (int i = 0; i < count; ++i) {
-    const Plane here = plane.moved(float(options.depth * i / (count - 1)));
-    film.add(scene::paint(scene::visible(scene::slice(forest, here, picture.sheet()), colouring), colouring,
-                          picture)
-                 .pixels);
+    film.add(scene::paint(slice_at(float(i) / float(count - 1)), colouring, picture, places).pixels);
     console.progress().advance();
   }
   film.finish();

@@ -59,7 +59,7 @@ void SectionView::draw() {
   if (!centre_) centre_ = opening(plane);
   const scene::SlicePicture drawn = picture();
   const frame::Image image = scene::paint(
-      scene::visible(scene::slice(forest_, plane, drawn.sheet()), colouring_), colouring_, drawn);
+      scene::visible(scene::slice(forest_, plane, drawn.sheet()), colouring_), colouring_, drawn, places_);
   image_ = QImage(image.pixels.data(), int(image.width), int(image.height), QImage::Format_RGBX8888).copy();
   image_.setDevicePixelRatio(devicePixelRatioF());
   update();

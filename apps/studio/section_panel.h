@@ -44,6 +44,7 @@ class SectionView final : public QWidget {
   scene::Colouring colouring_;
   std::optional<Place> centre_;  // along the plane's right and up; none: nothing was cut yet
   double height_ = 200.;         // µm
+  scene::Arrangement places_;    // of the scale bar: it does not jump while the plane moves
   QPointF mouse_;
   QImage image_;
   QTimer soon_;

@@ -16,7 +16,6 @@ namespace {
 // In heights of a letter.
 constexpr float margin = 1.6f, padding = 1.3f, line = 1.9f, thick = 1.2f, wide = 20.f;
 
-constexpr float plate = .8f;           // opacity; more shows lines through the words
 constexpr float share_at_most = .65f;  // of a picture's width and height that a plate takes
 
 std::size_t lines_of(const ColourBar& bar) {
@@ -36,18 +35,12 @@ std::string note_of(const ActivityView& activity) {
   return fmt::format("a spike, then fading, {:g} µm/ms", activity.speed);
 }
 // Whether a plate of this size leaves enough of a picture.
-bool fits(const frame::Image& image, float width, float height) {
-  return width <= share_at_most * float(image.width) && height <= share_at_most * float(image.height);
+bool fits(const frame::Viewport& picture, float width, float height) {
+  return width <= share_at_most * picture.width && height <= share_at_most * picture.height;
 }
+float tall(const ColourBar& bar) { return thick_of(bar) + line * float(lines_of(bar)); }
 
 }  // namespace
-
-Writing writing_in(const frame::Image& image, Background background) {
-  const bool dark = background == Background::dark;
-  return {{.height = std::max(7.f, std::round(float(image.height) / 80.f)),
-           .colour = dark ? Vec3(.89f, .91f, .94f) : Vec3(.13f, .16f, .20f)},
-          dark ? Vec3(.03f, .05f, .075f) : Vec3(1.f, 1.f, 1.f)};
-}
 
 Vec3 ColourBar::at(float t) const {
   const bool is_less = threshold && low + t * (high - low) < *threshold;
@@ -130,59 +123,61 @@ void paint(frame::Image& image, const ColourBar& bar, const Box& place, const Le
   for (const double value : ticks(double(bar.low), double(bar.high), 4)) write(float(value));
 }
 
-bool paint(frame::Image& image, std::span<const ColourBar> bars, Background background) {
-  const auto [letters, ground] = writing_in(image, background);
+std::optional<Block> block_of(std::span<const ColourBar> bars, const frame::Viewport& picture,
+                              Background background) {
+  const Lettering letters = letters_in(picture, background);
   const float h = letters.height;
-  float tall = 0.f;
-  for (const ColourBar& bar : bars)
-    tall += h * (margin + 2.f * padding + thick_of(bar) + line * float(lines_of(bar)));
-  if (bars.empty() || !fits(image, h * (wide + 2.f * padding), tall)) return false;
-  float top = h * margin;
+  float width = h * wide, height = h * (2.f * padding - margin);
   for (const ColourBar& bar : bars) {
-    const float left = h * (margin + padding), right = left + h * wide;
-    const float bottom = top + h * (2.f * padding + thick_of(bar) + line * float(lines_of(bar)));
-    const float note = bar.note.empty() ? 0.f : marks_width(bar, h) + letters.width(bar.note);
-    fill(image, {left - h * padding, top, std::max(right, left + note) + h * padding, bottom}, ground, plate);
-    float base = top + h * (padding + 1.f);
-    if (!bar.title.empty() || !bar.units.empty()) {
-      // Units may be long, and leave the title two thirds of the room.
-      const float room = right - left - (bar.units.empty() ? 0.f : h);
-      const std::string title =
-          letters.shortened(bar.title, std::max(room - letters.width(bar.units), room / 1.5f));
-      const std::string units = letters.shortened(bar.units, room - letters.width(title));
-      letters.write(image, title, left, base);
-      letters.write(image, units, right - letters.width(units), base);
-      base += h * line;
-    }
-    if (bar.map) {
-      const Box place{left, base - h, right, base - h + h * thick};
-      paint(image, bar, place, letters);
-      base = place.bottom + h * (1.7f + line);
-    }
-    const float dot = mark_size(h);
-    for (std::size_t i = 0; i < bar.marks.size(); ++i)
-      fill(image, {left + float(i) * dot, base - dot, left + float(i + 1) * dot, base}, bar.marks[i]);
-    letters.write(image, bar.note, left + marks_width(bar, h), base);
-    top = bottom + h * margin;
+    height += h * (margin + tall(bar));
+    if (!bar.note.empty()) width = std::max(width, marks_width(bar, h) + letters.width(bar.note));
   }
-  return true;
+  width += 2.f * h * padding;
+  if (bars.empty() || !fits(picture, h * (wide + 2.f * padding), height)) return std::nullopt;
+  const auto paint_all = [list = std::vector(bars.begin(), bars.end()), letters, h](frame::Image& image,
+                                                                                    float left, float top) {
+    left += h * padding;
+    const float right = left + h * wide, dot = mark_size(h);
+    for (const ColourBar& bar : list) {
+      float base = top + h * (padding + 1.f);
+      if (!bar.title.empty() || !bar.units.empty()) {
+        // Units may be long, and leave the title two thirds of the room.
+        const float room = right - left - (bar.units.empty() ? 0.f : h);
+        const std::string title =
+            letters.shortened(bar.title, std::max(room - letters.width(bar.units), room / 1.5f));
+        const std::string units = letters.shortened(bar.units, room - letters.width(title));
+        letters.write(image, title, left, base);
+        letters.write(image, units, right - letters.width(units), base);
+        base += h * line;
+      }
+      if (bar.map) {
+        const Box place{left, base - h, right, base - h + h * thick};
+        scene::paint(image, bar, place, letters);
+        base = place.bottom + h * (1.7f + line);
+      }
+      for (std::size_t i = 0; i < bar.marks.size(); ++i)
+        fill(image, {left + float(i) * dot, base - dot, left + float(i + 1) * dot, base}, bar.marks[i]);
+      letters.write(image, bar.note, left + marks_width(bar, h), base);
+      top += h * (margin + tall(bar));
+    }
+  };
+  return Block{Block::values, Spot::top_left, width, height, h * margin, paint_all};
 }
 
-bool paint(frame::Image& image, std::span<const LegendEntry> all, Background background, bool right) {
-  const auto [letters, ground] = writing_in(image, background);
+std::optional<Block> block_of(std::span<const LegendEntry> all, const frame::Viewport& picture,
+                              Background background) {
+  const Lettering letters = letters_in(picture, background);
   const float h = letters.height;
   float indent = 0.f;
   for (const LegendEntry& entry : all) indent = std::max(indent, swatch_width(entry, h) + .7f * h);
   // What has no room is shortened, and counted.
-  const float room = share_at_most * float(image.width) - indent - (2.f * padding + margin) * h,
-              rows = (share_at_most * float(image.height) / h - margin - 2.f * padding - 1.f) / line + 1.f;
-  if (all.empty() || room < 8.f * h || rows < std::min(3.f, float(all.size()))) return false;
+  const float room = share_at_most * picture.width - indent - (2.f * padding + margin) * h,
+              rows = (share_at_most * picture.height / h - margin - 2.f * padding - 1.f) / line + 1.f;
+  if (all.empty() || room < 8.f * h || rows < std::min(3.f, float(all.size()))) return std::nullopt;
   std::vector<LegendEntry> names(all.begin(), all.end());
-  std::size_t shown = names.size();
-  if (float(shown) > rows) {
-    shown = std::size_t(rows) - 1;
-    names.resize(shown);
-    names.push_back({fmt::format("… and {} more", all.size() - shown), {}});
+  if (float(names.size()) > rows) {
+    names.resize(std::size_t(rows) - 1);
+    names.push_back({fmt::format("… and {} more", all.size() - names.size()), {}});
   }
   float widest = 0.f;
   for (LegendEntry& entry : names) {
@@ -191,23 +186,23 @@ bool paint(frame::Image& image, std::span<const LegendEntry> all, Background bac
   }
   const float width = indent + widest + 2.f * padding * h,
               height = h * (2.f * padding + 1.f + line * (float(names.size()) - 1.f));
-  const float left = right ? float(image.width) - h * margin - width : h * margin, top = h * margin;
-  fill(image, {left, top, left + width, top + height}, ground, plate);
-  float base = top + h * (padding + 1.f);
-  for (const LegendEntry& entry : names) {
-    const float at = std::round(left + h * padding), foot = std::round(base);
-    const auto n = float(entry.colours.size());
-    for (float k = 0.f; k < n; k += 1.f) {
-      const float wide = swatch_width(entry, h) / n;
-      fill(image,
-           {at + std::round(k * wide), foot - std::round(mark_size(h)), at + std::round((k + 1.f) * wide),
-            foot},
-           screen_of(entry.colours[std::size_t(k)]));
+  const auto paint_all = [names, letters, h, indent](frame::Image& image, float left, float top) {
+    float base = top + h * (padding + 1.f);
+    for (const LegendEntry& entry : names) {
+      const float at = std::round(left + h * padding), foot = std::round(base);
+      const auto n = float(entry.colours.size());
+      for (float k = 0.f; k < n; k += 1.f) {
+        const float wide = swatch_width(entry, h) / n;
+        fill(image,
+             {at + std::round(k * wide), foot - std::round(mark_size(h)), at + std::round((k + 1.f) * wide),
+              foot},
+             screen_of(entry.colours[std::size_t(k)]));
+      }
+      letters.write(image, entry.name, at + indent, base);
+      base += h * line;
     }
-    letters.write(image, entry.name, at + indent, base);
-    base += h * line;
-  }
-  return true;
+  };
+  return Block{Block::names, Spot::top_left, width, height, h * margin, paint_all};
 }
 
 }  // namespace forest::scene

@@ -8,19 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "forest/scene/arrangement.h"
 #include "forest/scene/colour_map.h"
 #include "forest/scene/colouring.h"
-#include "forest/scene/lettering.h"
-#include "forest/scene/view.h"
 
 namespace forest::scene {
-
-/// Letters as large as a picture allows, and the colour (sRGB 0–1) that lies behind them.
-struct Writing {
-  Lettering letters;
-  Vec3 ground;
-};
-Writing writing_in(const frame::Image& image, Background background);
 
 class Playback;
 class Surfaces;
@@ -51,15 +43,14 @@ ColourBar bar_of(const Playback& playback, const ActivityView& activity, Backgro
 /// Of values on surfaces; none where they have none.
 std::optional<ColourBar> bar_of(const Surfaces& surfaces);
 
-/// One below the other at the top left, on ground that lets the picture through. A picture that is too small to read them in
-/// (about 280 × 130 pixels for one bar) stays as it is.
-/// @return  whether they are in it
-bool paint(frame::Image& image, std::span<const ColourBar> bars, Background background);
+/// One below the other, usually at the top left; none where a picture is too small to read them in (about 280 × 130 pixels for one bar).
+std::optional<Block> block_of(std::span<const ColourBar> bars, const frame::Viewport& picture,
+                              Background background);
 
-/// The names of colours, one below the other, at the top left, or right, on the same ground. Names that are too long are
-/// shortened, those for which there is no room counted; a picture in which not even three have room stays as it is.
-/// @return  whether they are in it
-bool paint(frame::Image& image, std::span<const LegendEntry> names, Background background, bool right);
+/// The names of colours, one below the other, usually at the top left too. Names that are too long are shortened, those for which there
+/// is no room counted; none in a picture in which not even three have room.
+std::optional<Block> block_of(std::span<const LegendEntry> names, const frame::Viewport& picture,
+                              Background background);
 
 /// The bar alone, without ground: its colours between `place`'s edges and its values below, which need twice the letters' height.
 void paint(frame::Image& image, const ColourBar& bar, const Box& place, const Lettering& letters);

@@ -12,6 +12,16 @@ frame::Image black(std::uint32_t width, std::uint32_t height) {
   return {width, height, std::vector<std::uint8_t>(std::size_t(width) * height * 4, 0), 0.};
 }
 
+// At its usual spot, or right of there. Returns whether it has room.
+bool paint(frame::Image& image, const auto& what, Background background, bool right = false) {
+  const frame::Viewport picture{float(image.width), float(image.height)};
+  const auto block = block_of(what, picture, background);
+  if (!block) return false;
+  const Box box = block->at(right ? Spot::top_right : block->usual, picture);
+  block->paint(image, box.left, box.top);
+  return true;
+}
+
 TEST(ColourBar, ShowsTheMapAndGreyBelowTheThreshold) {
   const ColourMap& map = *find_colour_map("viridis");
   const ColourBar bar{.map = &map, .low = -80.f, .high = 20.f, .threshold = -55.f};
@@ -35,7 +45,7 @@ TEST(ColourBar, OfSpikesAloneIsADotOfTheirColourAndNoMapOfValues) {
     EXPECT_EQ(bar.map, nullptr);
     EXPECT_EQ(bar.note, "a spike, then fading, 300 µm/ms");
     frame::Image image = black(640, 480);
-    EXPECT_TRUE(paint(image, {&bar, 1}, background));
+    EXPECT_TRUE(paint(image, std::span(&bar, 1), background));
     std::size_t dot = 0;
     for (std::size_t i = 0; i < image.pixels.size(); i += 4) {
       const Vec3 pixel = Vec3(image.pixels[i], image.pixels[i + 1], image.pixels[i + 2]) / 255.f;
@@ -53,7 +63,7 @@ TEST(ColourBar, BesideValuesSaysWhatFlashesAreWhereThereAreSome) {
     const ColourBar bar = bar_of(view, 12.5, "mV", background);
     EXPECT_EQ(bar.note, "a spike, then fading, 250 µm/ms");
     frame::Image image = black(640, 480);
-    EXPECT_TRUE(paint(image, {&bar, 1}, background));
+    EXPECT_TRUE(paint(image, std::span(&bar, 1), background));
     for (const Vec3& mark : bar.marks) {
       std::size_t dot = 0;
       for (std::size_t i = 0; i < image.pixels.size(); i += 4)
@@ -82,12 +92,12 @@ TEST(ColourBar, NamesOfColoursStandAtEitherSideAndNotWhereTheyDoNotFit) {
   };
   for (const bool right : {false, true}) {
     frame::Image image = black(640, 360);
-    EXPECT_TRUE(paint(image, names, Background::dark, right));
+    EXPECT_TRUE(paint(image, std::span(names), Background::dark, right));
     EXPECT_GT(greens(image, right ? 320 : 0, right ? 640 : 320), 30u);
     EXPECT_EQ(greens(image, right ? 0 : 320, right ? 320 : 640), 0u);
   }
   frame::Image small = black(80, 45);
-  EXPECT_FALSE(paint(small, names, Background::dark, false));
+  EXPECT_FALSE(paint(small, std::span(names), Background::dark));
   EXPECT_EQ(std::ranges::count(small.pixels, 0), std::ptrdiff_t(small.pixels.size()));
 }
 
@@ -107,15 +117,15 @@ TEST(ColourBar, NamesThatHaveNoRoomAreShortenedAndCounted) {
     return rows;
   };
   frame::Image many = black(640, 360), few = black(640, 360);
-  EXPECT_TRUE(paint(many, names, Background::dark, false));
-  EXPECT_TRUE(paint(few, std::span(names).first(5), Background::dark, false));
+  EXPECT_TRUE(paint(many, std::span(names), Background::dark));
+  EXPECT_TRUE(paint(few, std::span(names).first(5), Background::dark));
   EXPECT_GT(green_rows(many), green_rows(few));
   EXPECT_LT(green_rows(many), .65 * 360);
   names.resize(3);
   names[0].name.assign(500, 'w').append("ö");
   frame::Image wide = black(640, 360);
-  EXPECT_TRUE(paint(wide, names, Background::dark, false));
-  for (std::uint32_t y = 0; y < 360; ++y)  // the plate ends where two thirds of the picture do
+  EXPECT_TRUE(paint(wide, std::span(names), Background::dark));
+  for (std::uint32_t y = 0; y < 360; ++y)  // they end where two thirds of the picture do
     EXPECT_EQ(wide.pixels[4 * (std::size_t(y) * 640 + 430)], 0);
 }
 
@@ -134,11 +144,11 @@ TEST(ColourBar, IsLeftOutOfPicturesInWhichItCannotBeRead) {
                             {.map = &colour_maps().front()}};
   EXPECT_EQ(bars[0].title, "12.5 ms");
   frame::Image small = black(160, 100), large = black(640, 480);
-  EXPECT_FALSE(paint(small, bars, Background::dark));
+  EXPECT_FALSE(paint(small, std::span(bars), Background::dark));
   EXPECT_EQ(small.pixels, black(160, 100).pixels);
-  EXPECT_TRUE(paint(large, bars, Background::dark));
+  EXPECT_TRUE(paint(large, std::span(bars), Background::dark));
   EXPECT_NE(large.pixels, black(640, 480).pixels);
-  EXPECT_FALSE(paint(large, {}, Background::light));
+  EXPECT_FALSE(paint(large, std::span(bars).first(0), Background::light));
 }
 
 }  // namespace

@@ -7,8 +7,7 @@
 #include <numbers>
 
 #include "forest/core/half.h"
-#include "forest/scene/colour_bar.h"
-#include "forest/scene/lettering.h"
+#include "forest/scene/arrangement.h"
 #include "forest/scene/placed.h"
 
 namespace forest::scene {
@@ -194,18 +193,19 @@ std::vector<View> around_gallery(const Forest& forest, float aspect, std::span<c
 
 void paint_names(frame::Image& image, const Forest& forest, const View& view) {
   if (forest.instances().size() < 2) return;
-  Writing writing = writing_in(image, view.background);
-  writing.letters.height *= .8f;
   const frame::Viewport viewport{float(image.width), float(image.height)};
+  Lettering letters = letters_in(viewport, view.background);
+  letters.height *= .8f;
+  const Paper paper = paper_of(view.background);
   std::vector<Bounds> boxes;
   float widths = 0.f;
   for (const frame::Instance& instance : forest.instances()) {
     boxes.push_back(box_of(forest, instance));
     if (!boxes.back().empty()) widths += boxes.back().extent().x();
   }
-  const Vec3 middle = boxes.front().empty() ? Vec3(Vec3::Zero()) : boxes.front().centre();
+  const Vec3 first = boxes.front().empty() ? Vec3(Vec3::Zero()) : boxes.front().centre();
   const float slot = least_slot * widths / float(boxes.size()) /
-                     view.camera.pixel_size(viewport.height, (middle - view.camera.eye).norm());
+                     view.camera.pixel_size(viewport.height, (first - view.camera.eye).norm());
   const std::vector<std::string> names = without_common_ending(forest.circuit().morphologies);
   for (std::size_t i = 0; i < boxes.size(); ++i) {
     const Bounds& box = boxes[i];
@@ -216,9 +216,12 @@ void paint_names(frame::Image& image, const Forest& forest, const View& view) {
     if (!(left.z() > 0.f) || !(right.z() > 0.f)) continue;
     const std::string& name = names[forest.instances()[i].morphology];
     const float most = std::max((right.x() - left.x()) * (1.f + .5f * gap), slot);
-    const std::string text = writing.letters.shortened(name, most);
-    writing.letters.write(image, text, .5f * (left.x() + right.x() - writing.letters.width(text)),
-                          left.y() + 1.6f * writing.letters.height);
+    const std::string text = letters.shortened(name, most);
+    const float h = letters.height, half = .5f * letters.width(text), middle = .5f * (left.x() + right.x()),
+                base = left.y() + 1.6f * h;
+    paint_plate(image, paper,
+                {middle - half - .5f * h, base - 1.4f * h, middle + half + .5f * h, base + .6f * h});
+    letters.write(image, text, middle - half, base);
   }
 }
 

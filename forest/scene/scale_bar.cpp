@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include "forest/core/round_numbers.h"
-#include "forest/scene/colour_bar.h"
 
 namespace forest::scene {
 
@@ -18,26 +17,26 @@ ScaleBar scale_bar(const frame::Camera& camera, float height, float most) {
           length < 1000. ? fmt::format("{:.6g} µm", length) : fmt::format("{:.6g} mm", length / 1000.)};
 }
 
-bool paint_scale(frame::Image& image, const frame::Camera& camera, Background background) {
+std::optional<Block> scale_block(const frame::Camera& camera, const frame::Viewport& picture,
+                                 Background background) {
   // In heights of a letter, as colour bars have them.
-  constexpr float margin = 1.6f, padding = 1.1f, most = 16.f;
-  const Writing writing = writing_in(image, background);
-  const float h = writing.letters.height;
-  if (h * (most + 2.f * (margin + padding)) > .8f * float(image.width) || 12.f * h > float(image.height))
-    return false;
-  const ScaleBar bar = scale_bar(camera, float(image.height), h * most);
-  const float left = h * (margin + padding), bottom = float(image.height) - h * (margin + padding);
-  const float wide = std::max(bar.length, writing.letters.width(bar.label)), thick = std::max(1.5f, .18f * h);
-  const float tick = .35f * h;
-  const auto ink = [&](const Box& box) { fill(image, box, writing.letters.colour); };
-  fill(image,
-       {left - h * padding, bottom - h * (2.2f + padding), left + wide + h * padding, bottom + h * padding},
-       writing.ground, .62f);
-  writing.letters.write(image, bar.label, left, bottom - h);
-  ink({left, bottom - thick, left + bar.length, bottom});
-  for (const float end : {left, left + bar.length - thick})
-    ink({end, bottom - thick - tick, end + thick, bottom + tick});
-  return true;
+  constexpr float margin = 1.6f, padding = 1.1f, most = 16.f, above = 2.2f;
+  const Lettering letters = letters_in(picture, background);
+  const float h = letters.height;
+  if (h * (most + 2.f * (margin + padding)) > .8f * picture.width || 12.f * h > picture.height)
+    return std::nullopt;
+  const ScaleBar bar = scale_bar(camera, picture.height, h * most);
+  const float width = std::max(bar.length, letters.width(bar.label)) + 2.f * h * padding;
+  const auto paint = [bar, letters, h](frame::Image& image, float left, float top) {
+    left += h * padding;
+    const float bottom = top + h * (above + padding), thick = std::max(1.5f, .18f * h), tick = .35f * h;
+    const auto ink = [&](const Box& box) { fill(image, box, letters.colour); };
+    letters.write(image, bar.label, left, bottom - h);
+    ink({left, bottom - thick, left + bar.length, bottom});
+    for (const float end : {left, left + bar.length - thick})
+      ink({end, bottom - thick - tick, end + thick, bottom + tick});
+  };
+  return Block{Block::scale, Spot::bottom_left, width, h * (above + 2.f * padding), h * margin, paint};
 }
 
 }  // namespace forest::scene

@@ -2,10 +2,10 @@
 // How long a round number of µm or mm is in a picture: in perspective, at the depth of what the camera looks at.
 #pragma once
 
+#include <optional>
 #include <string>
 
-#include "forest/frame/frame.h"
-#include "forest/scene/view.h"
+#include "forest/scene/arrangement.h"
 
 namespace forest::scene {
 
@@ -16,7 +16,8 @@ struct ScaleBar {
 /// The longest of 1, 2 or 5 × 10ⁿ µm that takes up no more than `most` pixels of a picture `height` pixels high.
 ScaleBar scale_bar(const frame::Camera& camera, float height, float most);
 
-/// At the bottom left. Returns false where the picture is too small for it, and leaves it as it is.
-bool paint_scale(frame::Image& image, const frame::Camera& camera, Background background);
+/// Usually at the bottom left; none where the picture is too small for it.
+std::optional<Block> scale_block(const frame::Camera& camera, const frame::Viewport& picture,
+                                 Background background);
 
 }  // namespace forest::scene

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/scene/scale_bar.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -36,19 +37,26 @@ TEST(ScaleBar, NamesMicrometresAndMillimetres) {
   EXPECT_EQ(scale_bar(at(1e4f), 720.f, 160.f).label, "1 mm");
 }
 
-TEST(ScaleBar, IsPaintedAtTheBottomLeftOnlyAndNotIntoSmallPictures) {
-  frame::Image image;
-  image.width = 640, image.height = 360, image.pixels.assign(std::size_t(4) * 640 * 360, 0);
-  ASSERT_TRUE(paint_scale(image, at(100.f), Background::dark));
-  std::size_t inside = 0, elsewhere = 0;
-  for (std::size_t y = 0; y < 360; ++y)
-    for (std::size_t x = 0; x < 640; ++x)
-      if (image.pixels[4 * (640 * y + x)] != 0) (x < 200 && y > 300 ? inside : elsewhere) += 1;
-  EXPECT_GT(inside, 500u);
-  EXPECT_EQ(elsewhere, 0u);
-  frame::Image small;
-  small.width = 64, small.height = 64, small.pixels.assign(std::size_t(4) * 64 * 64, 0);
-  EXPECT_FALSE(paint_scale(small, at(100.f), Background::dark));
+TEST(ScaleBar, IsPaintedWithinItsBlockAndNotIntoSmallPictures) {
+  const frame::Viewport picture{640.f, 360.f};
+  frame::Image image{640, 360, std::vector<std::uint8_t>(std::size_t(4) * 640 * 360), 0.};
+  const auto block = scale_block(at(100.f), picture, Background::dark);
+  ASSERT_TRUE(block);
+  for (const Spot spot : {block->usual, Spot::top_right}) {
+    std::ranges::fill(image.pixels, std::uint8_t(0));
+    const Box box = block->at(spot, picture);
+    block->paint(image, box.left, box.top);
+    std::size_t inside = 0, elsewhere = 0;
+    for (std::size_t y = 0; y < 360; ++y)
+      for (std::size_t x = 0; x < 640; ++x)
+        if (image.pixels[4 * (640 * y + x)] != 0)
+          (float(x) >= box.left && float(x) < box.right && float(y) >= box.top && float(y) < box.bottom
+               ? inside
+               : elsewhere) += 1;
+    EXPECT_GT(inside, 200u);
+    EXPECT_EQ(elsewhere, 0u);
+  }
+  EXPECT_FALSE(scale_block(at(100.f), {64.f, 64.f}, Background::dark));
 }
 
 }  // namespace

@@ -16,28 +16,29 @@ namespace {
 constexpr double rim_pixels = 1.1;  // how much darker line a profile has around it, where it is large enough
 constexpr int lines = 4;            // a pixel's scan lines
 constexpr std::size_t rows_at_once = 16;
-constexpr float plate_opacity = .92f;  // behind the scale bar
+constexpr std::uint32_t glance =
+    320;  // pixels across of what is looked at to place the scale bar of vector graphics
 
-struct Ground {
+struct Tones {
   Vec3 paper, ink, plate;  // linear light; the plate under a scale bar is seen on the paper
   float tint, rim;         // share of paper in a filled profile; light that its rim keeps
 };
-Ground ground_of(Background background) {
-  return background == Background::light ? Ground{.paper = Vec3::Constant(.86f),
-                                                  .ink = Vec3::Constant(.01f),
-                                                  .plate = Vec3::Constant(.77f),
-                                                  .tint = .30f,
-                                                  .rim = .22f}
-                                         : Ground{.paper = Vec3(.006f, .009f, .014f),
-                                                  .ink = Vec3::Constant(.8f),
-                                                  .plate = Vec3(.016f, .021f, .030f),
-                                                  .tint = 0.f,
-                                                  .rim = .45f};
+Tones tones_of(Background background) {
+  return background == Background::light ? Tones{.paper = Vec3::Constant(.86f),
+                                                 .ink = Vec3::Constant(.01f),
+                                                 .plate = Vec3::Constant(.77f),
+                                                 .tint = .30f,
+                                                 .rim = .22f}
+                                         : Tones{.paper = Vec3(.006f, .009f, .014f),
+                                                 .ink = Vec3::Constant(.8f),
+                                                 .plate = Vec3(.016f, .021f, .030f),
+                                                 .tint = 0.f,
+                                                 .rim = .45f};
 }
 
-Vec3 fill_of(const Colouring& colouring, const Profile& p, const Ground& ground) {
+Vec3 fill_of(const Colouring& colouring, const Profile& p, const Tones& tones) {
   const Vec3& base = colouring.palette[8u * colouring.states[p.instance].colour_class + p.kind];
-  return base.cwiseMin(1.f) * (1.f - ground.tint) + ground.paper * ground.tint;
+  return base.cwiseMin(1.f) * (1.f - tones.tint) + tones.paper * tones.tint;
 }
 
 float srgb(float c) { return to_srgb(std::clamp(c, 0.f, 1.f)); }
@@ -78,9 +79,9 @@ Shape within_rim(const Shape& shape) {
   return inner.size() > 2 ? inner : Shape{};
 }
 
-class Paper {
+class Sketchpad {
  public:
-  Paper(std::size_t width, std::size_t first, std::size_t last, const Vec3& colour)
+  Sketchpad(std::size_t width, std::size_t first, std::size_t last, const Vec3& colour)
       : width_(width), first_(first), last_(last), pixels_(width * (last - first), colour), covered_(width) {}
 
   /// A convex shape, its edges by the share of each pixel that it covers.
@@ -134,20 +135,24 @@ ScaleBar scale_bar_of(const SlicePicture& picture) {
           length < 1000. ? fmt::format("{:.0f} µm", length) : fmt::format("{:.0f} mm", length / 1000.)};
 }
 
-void paint_scale_bar(frame::Image& image, const SlicePicture& picture, const Ground& ground) {
+Block scale_block(const SlicePicture& picture, const Tones& tones) {
   const ScaleBar bar = scale_bar_of(picture);
-  const float height = std::max(7.f, std::round(float(image.height) / 60.f)), margin = 1.7f * height,
-              bottom = float(image.height) - margin, top = bottom - .4f * height;
-  const Vec3 colour = ground.ink.unaryExpr(&srgb);
-  // On a plate, so that no profile runs through it.
-  const Lettering letters{.height = height, .colour = colour};
-  const float pad = .7f * height,
-              wide = std::max(float(bar.length / picture.pixel()), letters.width(bar.label));
-  fill(image, {margin - pad, top - 1.7f * height - pad, margin + wide + pad, bottom + pad},
-       ground.plate.unaryExpr(&srgb), plate_opacity);
-  fill(image, {margin, top, margin + float(bar.length / picture.pixel()), bottom}, colour);
-  letters.write(image, bar.label, margin, top - .7f * height);
+  const float height = std::max(7.f, std::round(float(picture.height_pixels) / 60.f)), pad = .7f * height,
+              length = float(bar.length / picture.pixel());
+  const Lettering letters{.height = height, .colour = tones.ink.unaryExpr(&srgb)};
+  return {Block::scale,
+          Spot::bottom_left,
+          std::max(length, letters.width(bar.label)) + 2.f * pad,
+          2.1f * height + 2.f * pad,
+          height,
+          [=](frame::Image& image, float left, float top) {
+            left += pad, top += pad + 1.7f * height;
+            fill(image, {left, top, left + length, top + .4f * height}, letters.colour);
+            letters.write(image, bar.label, left, top - .7f * height);
+          }};
 }
+
+Paper paper_of(const Tones& tones) { return {tones.paper, tones.paper, tones.plate.unaryExpr(&srgb)}; }
 
 }  // namespace
 
@@ -162,9 +167,11 @@ Slice visible(Slice slice, const Colouring& colouring) {
   return slice;
 }
 
-frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePicture& picture) {
+namespace {
+
+frame::Image paint_profiles(const Slice& slice, const Colouring& colouring, const SlicePicture& picture) {
   const std::size_t width = picture.width_pixels, height = picture.height_pixels;
-  const Ground ground = ground_of(picture.background);
+  const Tones tones = tones_of(picture.background);
   struct Drawn {
     Shape whole, inner;
     double top = INFINITY, bottom = -INFINITY;
@@ -180,13 +187,13 @@ frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePi
                      std::vector<std::uint8_t>(width * height * 4, 255), 0.};
   parallel_for((height + rows_at_once - 1) / rows_at_once, 1, [&](std::size_t band) {
     const std::size_t first = band * rows_at_once, last = std::min(height, first + rows_at_once);
-    Paper paper(width, first, last, ground.paper);
+    Sketchpad paper(width, first, last, tones.paper);
     const auto fill = [&](std::size_t i, bool rim) {
       const Drawn& d = drawn[i];
       if (d.bottom < double(first) || d.top > double(last)) return;
-      const Vec3 colour = fill_of(colouring, slice.profiles[i], ground);
+      const Vec3 colour = fill_of(colouring, slice.profiles[i], tones);
       if (rim)
-        paper.fill(d.whole, d.inner.empty() ? colour : Vec3(ground.rim * colour));
+        paper.fill(d.whole, d.inner.empty() ? colour : Vec3(tones.rim * colour));
       else
         paper.fill(d.inner, colour);
     };
@@ -203,12 +210,35 @@ frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePi
         image.pixels[4 * (first * width + i) + std::size_t(c)] =
             std::uint8_t(std::lround(255.f * srgb(paper.pixels()[i][c])));
   });
-  if (picture.scale_bar) paint_scale_bar(image, picture, ground);
   return image;
 }
 
+}  // namespace
+
+frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePicture& picture,
+                   Arrangement& places) {
+  frame::Image image = paint_profiles(slice, colouring, picture);
+  if (!picture.scale_bar) return image;
+  const Tones tones = tones_of(picture.background);
+  const Block bar = scale_block(picture, tones);
+  places.paint(image, paper_of(tones), {&bar, 1});
+  return image;
+}
+
+frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePicture& picture) {
+  Arrangement places;
+  return paint(slice, colouring, picture, places);
+}
+
+void look_at(const Slice& slice, const Colouring& colouring, const SlicePicture& picture,
+             Arrangement& places) {
+  const Tones tones = tones_of(picture.background);
+  const Block bar = scale_block(picture, tones);
+  places.look_at(paint_profiles(slice, colouring, picture), paper_of(tones), {&bar, 1});
+}
+
 std::string to_svg(const Slice& slice, const Colouring& colouring, const SlicePicture& picture) {
-  const Ground ground = ground_of(picture.background);
+  const Tones tones = tones_of(picture.background);
   const double wide = picture.width_pixels * picture.pixel();
   const auto at = [&](const Place& p) {  // µm from the upper left corner
     return fmt::format("{:.3f} {:.3f}", p.x() - picture.centre.x() + .5 * wide,
@@ -217,7 +247,7 @@ std::string to_svg(const Slice& slice, const Colouring& colouring, const SlicePi
   std::string svg = fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" viewBox=\"0 0 {:.6g} {:.6g}\">\n"
       "<rect width=\"100%\" height=\"100%\" fill=\"{}\"/>\n",
-      picture.width_pixels, picture.height_pixels, wide, picture.height, hex(ground.paper));
+      picture.width_pixels, picture.height_pixels, wide, picture.height, hex(tones.paper));
   for (std::size_t i = 0; i < slice.profiles.size();) {
     const Profile& first = slice.profiles[i];
     svg += fmt::format("<g id=\"neuron-{}\">", first.instance);
@@ -225,13 +255,13 @@ std::string to_svg(const Slice& slice, const Colouring& colouring, const SlicePi
     while (i < slice.profiles.size() && slice.profiles[i].instance == first.instance) {
       const Profile& p = slice.profiles[i++];
       all.push_back(p.shape.outline(.1 * picture.pixel(), 4e-3));
-      svg += fmt::format("<path fill=\"{}\" d=\"M{}", hex(fill_of(colouring, p, ground)), at(all.back()[0]));
+      svg += fmt::format("<path fill=\"{}\" d=\"M{}", hex(fill_of(colouring, p, tones)), at(all.back()[0]));
       for (std::size_t k = 1; k < all.back().size(); ++k) svg += "L" + at(all.back()[k]);
       svg += "Z\"/>";
     }
     svg +=
         fmt::format("<path fill=\"none\" stroke=\"{}\" stroke-width=\"{:.4g}\" stroke-linecap=\"round\" d=\"",
-                    hex(ground.rim * fill_of(colouring, first, ground)), rim_pixels * picture.pixel());
+                    hex(tones.rim * fill_of(colouring, first, tones)), rim_pixels * picture.pixel());
     Place before = Place::Constant(INFINITY);
     for (const auto& [p, q] : boundary_of_union(all)) {
       if (p != before) svg += "M" + at(p);
@@ -241,19 +271,35 @@ std::string to_svg(const Slice& slice, const Colouring& colouring, const SlicePi
     svg += "\"/></g>\n";
   }
   if (picture.scale_bar) {
+    // In the units of the drawing as a picture of it has it in pixels.
+    SlicePicture small = picture;
+    small.width_pixels = glance;
+    small.height_pixels = std::max(1u, std::uint32_t(glance * picture.height_pixels / picture.width_pixels));
+    Arrangement places;
+    const frame::Image seen = paint_profiles(slice, colouring, small);
     const ScaleBar bar = scale_bar_of(picture);
-    const double margin = .035 * picture.height, bottom = picture.height - margin;
-    const double plate = std::max(bar.length, .55 * margin * double(bar.label.size()));
-    svg += fmt::format(
-        "<rect x=\"{:.4g}\" y=\"{:.4g}\" width=\"{:.4g}\" height=\"{:.4g}\" fill=\"{}\" "
-        "fill-opacity=\"{}\"/>\n",
-        .5 * margin, bottom - 1.7 * margin, plate + margin, 2.2 * margin, hex(ground.plate), plate_opacity);
+    const double letter = .9 * .035 * picture.height, pad = .5 * letter;
+    const double plate = std::max(bar.length, .6 * letter * double(bar.label.size())) + 2. * pad;
+    Block block{.kind = Block::scale, .usual = Spot::bottom_left};
+    block.width = float(plate), block.height = float(1.3 * letter + 2. * pad), block.margin = float(pad);
+    Block in_pixels = block;
+    for (float* length : {&in_pixels.width, &in_pixels.height, &in_pixels.margin})
+      *length /= float(small.pixel());
+    places.look_at(seen, paper_of(tones), {&in_pixels, 1});
+    const Box box = places.place(block, {float(wide), float(picture.height)});
+    const Box pixels = places.place(in_pixels, {float(small.width_pixels), float(small.height_pixels)});
+    if (const float opacity = plate_opacity(hidden_by(pixels, seen, paper_of(tones))); opacity > 0.f)
+      svg += fmt::format(
+          "<rect x=\"{:.4g}\" y=\"{:.4g}\" width=\"{:.4g}\" height=\"{:.4g}\" fill=\"{}\" "
+          "fill-opacity=\"{:.2f}\"/>\n",
+          box.left, box.top, block.width, block.height, hex(tones.plate), opacity);
+    const double left = double(box.left) + pad, foot = double(box.bottom) - pad;
     svg += fmt::format(
         "<rect x=\"{0:.4g}\" y=\"{1:.4g}\" width=\"{2:.6g}\" height=\"{3:.4g}\" fill=\"{4}\"/>\n"
         "<text x=\"{0:.4g}\" y=\"{5:.4g}\" font-family=\"sans-serif\" font-size=\"{6:.4g}\" "
         "fill=\"{4}\">{7}</text>\n",
-        margin, bottom - .25 * margin, bar.length, .25 * margin, hex(ground.ink), bottom - .5 * margin,
-        .9 * margin, bar.label);
+        left, foot - .25 * letter, bar.length, .25 * letter, hex(tones.ink), foot - .55 * letter, letter,
+        bar.label);
   }
   return svg + "</svg>\n";
 }

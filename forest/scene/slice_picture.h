@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "forest/scene/arrangement.h"
 #include "forest/scene/slice.h"
 #include "forest/scene/view.h"
 
@@ -16,7 +17,7 @@ struct SlicePicture {
   double height = 100.;  // of the picture, µm
   std::uint32_t width_pixels = 1280, height_pixels = 720;
   Background background = Background::light;
-  bool scale_bar = true;  // labelled with its length
+  bool scale_bar = true;  // labelled with its length, where it hides least
 
   double pixel() const { return height / height_pixels; }  // µm
   Sheet sheet() const;
@@ -25,7 +26,13 @@ struct SlicePicture {
 /// Without the profiles of neurons that are hidden.
 Slice visible(Slice slice, const Colouring& colouring);
 
+/// @param places  where the scale bar stands, in all pictures that share it at one spot
+frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePicture& picture,
+                   Arrangement& places);
 frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePicture& picture);
+/// Has a look at one of the pictures of a film.
+void look_at(const Slice& slice, const Colouring& colouring, const SlicePicture& picture,
+             Arrangement& places);
 
 /// The same as SVG with one path a neuron, its profiles united; ids are the neurons' numbers.
 std::string to_svg(const Slice& slice, const Colouring& colouring, const SlicePicture& picture);

@@ -163,7 +163,7 @@ TEST(Slice, ThePictureFillsAsMuchAsTheAreasSay) {
   const auto red = [&](std::size_t x, std::size_t y) { return int(full.pixels[4 * (y * 800 + x)]); };
   const int profile = red(700, 100), ground = paper.pixels[0];
   EXPECT_LT(profile, ground * 2 / 3);
-  EXPECT_GT(red(22, 862), profile + (ground - profile) * 3 / 5);  // left of the label
+  EXPECT_GT(red(22, 862), profile + (ground - profile) / 2);  // left of the label
   const std::string svg = to_svg(found, colouring, picture);
   EXPECT_NE(svg.find("<text"), std::string::npos);
   EXPECT_NE(svg.find("id=\"neuron-" + std::to_string(found.profiles[0].instance)), std::string::npos);

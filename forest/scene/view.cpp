@@ -795,6 +795,11 @@ float least_width_of(const Forest& forest, const frame::Camera& camera, std::uin
   return std::min(least, 4.f) * std::clamp((dense - share) / (dense - sparse), 0.f, 1.f);
 }
 
+Ground ground_of(Background background) {
+  return background == Background::light ? Ground{light_of(0xF7F9FC), light_of(0xE6EBF2), light_of(0xEDF1F7)}
+                                         : Ground{light_of(0x0E1420), light_of(0x05070C), light_of(0x0A0F1A)};
+}
+
 frame::Frame compose(const Forest& forest, const View& view, const Colouring& colouring, const Cut& cut,
                      std::uint32_t width, std::uint32_t height, std::span<const frame::Overlay> overlays) {
   frame::Frame f;
@@ -810,13 +815,8 @@ frame::Frame compose(const Forest& forest, const View& view, const Colouring& co
   frame::Style& s = f.style;
   constexpr float rim_on_light = .3f;  // a darkness among dark branches hides their colours
   s.halo = view.background == Background::light ? rim_on_light * view.halo : view.halo;
-  if (view.background == Background::light) {
-    s.background_top = light_of(0xF7F9FC), s.background_bottom = light_of(0xE6EBF2),
-    s.fog_colour = light_of(0xEDF1F7);
-  } else {
-    s.background_top = light_of(0x0E1420), s.background_bottom = light_of(0x05070C),
-    s.fog_colour = light_of(0x0A0F1A);
-  }
+  const Ground ground = ground_of(view.background);
+  s.background_top = ground.top, s.background_bottom = ground.bottom, s.fog_colour = ground.fog;
   if (const Fog fog = fog_of(forest, view.camera, fog_strength(view)); std::isfinite(fog.length))
     s.fog_start = fog.start, s.fog_length = fog.length;
   return f;

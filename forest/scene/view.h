@@ -116,6 +116,12 @@ FlashColours flash_colours(Background background);
 float least_width_of(const Forest& forest, const frame::Camera& camera, std::uint32_t width,
                      std::uint32_t height);
 
+/// What lies behind everything, in linear light: at the top and the bottom of a picture, and in its fog.
+struct Ground {
+  Vec3 top, bottom, fog;
+};
+Ground ground_of(Background background);
+
 /// The picture of a view. The spans of the frame point into `cut`, `colouring` and `overlays`, which must outlive it.
 frame::Frame compose(const Forest& forest, const View& view, const Colouring& colouring, const Cut& cut,
                      std::uint32_t width, std::uint32_t height,
