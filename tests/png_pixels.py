@@ -4,8 +4,8 @@ import struct
 import zlib
 
 
-def pixels(path):
-    """Red, green and blue of every pixel, row by row, of a PNG with 8 bits a channel and no interlacing."""
+def pixels(path, channels=3):
+    """Red, green and blue (and opacity) of every pixel, row by row, of a PNG with 8 bits a channel and no interlacing."""
     data, at, packed = open(path, "rb").read(), 8, b""
     while at < len(data):
         size, kind = struct.unpack(">I4s", data[at:at + 8])
@@ -27,4 +27,4 @@ def pixels(path):
             row[i] = (row[i] + (0, left, above, (left + above) // 2, paeth)[line[0]]) & 255
         rows.append(row)
         before = row
-    return [tuple(row[i:i + 3]) for row in rows for i in range(0, stride, each)]
+    return [tuple(row[i:i + channels]) for row in rows for i in range(0, stride, each)]

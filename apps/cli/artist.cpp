@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/frame/matte.h"
 #include "forest/io/png.h"
 #include "forest/scene/colour_bar.h"
 #include "forest/scene/gallery.h"
@@ -35,7 +36,20 @@ Artist::Artist(scene::Forest forest, Drawer drawer, circuit::NodeSets sets)
   renderer_->load(forest_.geometry());
 }
 
+Drawn Artist::draw_transparent(scene::View view, std::uint32_t width, std::uint32_t height,
+                               const Wanted& wanted) {
+  view.behind = 0.f;
+  Drawn on_black = draw(view, width, height, wanted);
+  view.behind = 1.f;
+  const Drawn on_white = draw(view, width, height, wanted);
+  on_black.cull += on_white.cull, on_black.draw += on_white.draw, on_black.resolve += on_white.resolve;
+  on_black.image = frame::matted(on_black.image, on_white.image);
+  return on_black;
+}
+
 Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t height, Wanted wanted) {
+  if (view.background == scene::Background::transparent && !view.behind)
+    return draw_transparent(view, width, height, wanted);
   if (!colouring_ || view.colour_by != coloured_by_ || view.background != coloured_for_ ||
       view.targets != shown_as_) {
     colouring_ = scene::colour(targets_, view);
@@ -168,6 +182,13 @@ bool Artist::look_at(const scene::View& view, const Marks& marks, frame::Image& 
   return !all.blocks.empty();
 }
 
+void must_have_ground(scene::Background background) {
+  if (background == scene::Background::transparent)
+    throw Error(
+        "a film has no transparent background; take --background dark or light, or make single pictures by "
+        "'brainforest render'");
+}
+
 FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& plan,
                  const std::filesystem::path& file, Progress& progress,
                  const std::optional<scene::ActivityView>& activity) {
@@ -181,6 +202,7 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
     plan.look.put_on(view);
     view.targets.insert(view.targets.end(), plan.targets.begin(), plan.targets.end());
     view.samples = plan.samples.value_or(artist.sees_through(view) ? 32 : 8);
+    must_have_ground(view.background);
     if (plan.synapses) view.synapses = *plan.synapses;
     if (plan.gaze) view.detail.gaze = plan.gaze->at(1000. * i / plan.frames_per_second);
     if (activity) {
@@ -240,22 +262,29 @@ void play(Artist& artist, const ActivityOptions& options, scene::View& view, Con
   view.activity->time = time;
 }
 
-void add_look(CLI::App& command, Look& look) {
-  static const std::map<std::string, scene::Background> backgrounds{{"dark", scene::Background::dark},
-                                                                    {"light", scene::Background::light}};
-  static const std::map<std::string, scene::ColourBy> colours{
-      {"type", scene::ColourBy::type},     {"layer", scene::ColourBy::layer},
-      {"kind", scene::ColourBy::kind},     {"neuron", scene::ColourBy::neuron},
-      {"target", scene::ColourBy::target}, {"depth", scene::ColourBy::depth}};
-  command
-      .add_option("--background", look.background, "What lies behind; by default as the view says, or dark")
-      ->transform(one_of(backgrounds))
-      ->option_text("dark|light");
-  command
-      .add_option("--colour-by", look.colour_by,
-                  "What the colours of neurons mean; by default as the view says")
-      ->transform(one_of(colours))
-      ->option_text("type|layer|kind|neuron|target|depth");
+namespace {
+
+// An option that takes one of the words, which are those of `place`'s values in their order.
+template <class T, std::size_t N>
+void add_words(CLI::App& command, const char* name, std::optional<T>& place,
+               const std::array<std::string_view, N>& words, const std::string& help) {
+  std::map<std::string, T> values;
+  for (std::size_t i = 0; i < N; ++i) values.emplace(words[i], T(i));
+  command.add_option(name, place, help)
+      ->transform(one_of(values))
+      ->option_text(fmt::format("{}", fmt::join(words, "|")));
+}
+
+}  // namespace
+
+void add_look(CLI::App& command, Look& look, const char* usual_background, const char* usual_colours) {
+  add_words(
+      command, "--background", look.background, scene::background_words,
+      fmt::format("What lies behind; by default {}. Transparent: nothing, for slides and figures, in the "
+                  "colours of light ground",
+                  usual_background));
+  add_words(command, "--colour-by", look.colour_by, scene::colour_by_words,
+            fmt::format("What the colours of neurons mean; by default {}", usual_colours));
 }
 
 void add_marks(CLI::App& command, Marks& marks) {

@@ -65,7 +65,7 @@ class Artist {
   /// @param sets  names that targets of views may use
   explicit Artist(scene::Forest forest, Drawer drawer = Drawer::automatic, circuit::NodeSets sets = {});
 
-  /// A view with a gaze or with large pixels is drawn in layers (apps/foveated.h).
+  /// A view with a gaze or with large pixels is drawn in layers (apps/foveated.h), one that is transparent twice (frame/matte.h).
   Drawn draw(const scene::View& view, std::uint32_t width, std::uint32_t height, Wanted wanted = {});
   /// The pixels of the last picture that was not drawn in layers.
   frame::Image read() { return renderer_->read(); }
@@ -110,6 +110,7 @@ class Artist {
     std::vector<scene::Block> blocks;
     std::string missing;  // as explain returns it
   };
+  Drawn draw_transparent(scene::View view, std::uint32_t width, std::uint32_t height, const Wanted& wanted);
   Words words(const scene::View& view, const Marks& marks, const frame::Viewport& picture) const;
   void name_cells(const scene::View& view, const Marks& marks, frame::Image& image) const;
 
@@ -151,6 +152,9 @@ struct FilmPlan {
   double from = 0., rate = 0.;                   // of activity: ms at the first picture, ms a second of film
 };
 
+/// Throws Error when it is transparent, as no film is.
+void must_have_ground(scene::Background background);
+
 /// Films what a path shows, with activity as it goes on when it is given a look. Throws Error when no picture shows anything of
 /// a forest that it should show.
 FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& plan,
@@ -169,7 +173,8 @@ void add_activity(CLI::App& command, ActivityOptions& options, const char* name,
 void play(Artist& artist, const ActivityOptions& options, scene::View& view, Console& console);
 
 /// --background and --colour-by.
-void add_look(CLI::App& command, Look& look);
+void add_look(CLI::App& command, Look& look, const char* usual_background = "as the view says, or dark",
+              const char* usual_colours = "as the view says");
 /// --no-legend and --scale.
 void add_marks(CLI::App& command, Marks& marks);
 

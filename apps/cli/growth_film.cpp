@@ -115,6 +115,7 @@ FilmFigures film_growth(std::span<const std::filesystem::path> folders, const Fi
   const scene::Forest forest = scene::hung(whole, names, somata);
   scene::View view = scene::overview(forest, aspect);
   plan.look.put_on(view);
+  must_have_ground(view.background);
   view.targets = plan.targets;
   view.samples = plan.samples.value_or(16);
 

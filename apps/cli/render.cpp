@@ -138,6 +138,10 @@ std::function<void()> render(CLI::App& command, Console& console) {
   add_marks(command, options->marks);
   add_renderer(command, options->drawer);
   return [options, &console] {
+    if (extension_of(options->out).starts_with(".jp") &&
+        options->look.background == scene::Background::transparent)
+      throw Error(fmt::format("{}: JPEG pictures are never transparent; give a name that ends in .png",
+                              options->out.string()));
     must_take(options->out, png_picture);
     const auto [width, height] = parse_size(options->size);
     SurfaceOptions named = options->surfaces;
@@ -289,6 +293,7 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     growth->excludes(other);
   return [options, &console] {
     must_take(options->out, mp4_film);
+    must_have_ground(options->plan.look.background.value_or(scene::Background::dark));
     FilmPlan plan = options->plan;
     const auto tell_of = [&](const FilmFigures& figures) {
       if (figures.covered == 0.)

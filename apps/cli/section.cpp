@@ -31,7 +31,8 @@ namespace {
 
 struct Options {
   std::filesystem::path forest, out;
-  std::string plane, size = "1280x960", centre, colour_by = "type", background = "light";
+  std::string plane, size = "1280x960", centre;
+  Look look{.background = scene::Background::light, .colour_by = {}};
   double height = 0.;  // µm; 0: all of it
   double depth = 0., seconds = 5.;
   int rate = 25;
@@ -124,7 +125,7 @@ scene::Sheet all_of(const scene::Forest& forest, const Plane& plane, double dept
 void run(const Options& options, Console& console) {
   const std::string extension = options.out.extension().string();
   if (extension == ".png") must_take(options.out, png_picture);
-  if (extension == ".mp4") must_take(options.out, mp4_film);
+  if (extension == ".mp4") must_take(options.out, mp4_film), must_have_ground(*options.look.background);
   must_have_folder(options.out);
   if (extension == ".mp4" && options.depth == 0.)
     throw Error("a film moves the plane; say how far by --through, in µm");
@@ -134,8 +135,9 @@ void run(const Options& options, Console& console) {
     throw Error("--height and --centre are of pictures; a table tells of all that the plane cuts");
   const scene::Forest forest = open_forest(options.forest);
   const Plane plane = plane_of(options.plane, forest);
-  scene::SlicePicture picture{.background = options.background == "dark" ? scene::Background::dark
-                                                                         : scene::Background::light};
+  scene::View view;
+  options.look.put_on(view);
+  scene::SlicePicture picture{.background = view.background};
   std::tie(picture.width_pixels, picture.height_pixels) = parse_size(options.size);
   const scene::Sheet all =
       options.height > 0. ? scene::sheet_of(forest, plane) : all_of(forest, plane, options.depth);
@@ -149,11 +151,6 @@ void run(const Options& options, Console& console) {
     const auto c = numbers_of(options.centre, 2, "two numbers, µm along the section's right and up");
     picture.centre = {double(c[0]), double(c[1])};
   }
-  scene::View view;
-  constexpr const char* ways[] = {"type", "layer", "kind", "neuron"};
-  for (std::size_t i = 0; i < std::size(ways); ++i)
-    if (options.colour_by == ways[i]) view.colour_by = scene::ColourBy(i);
-  view.background = picture.background;
   add_appearances(options.targets, view.targets);
   const scene::Targets targets(forest, read_node_sets(forest, options.targets.node_sets, console));
   warn_of_empty(targets, view.targets, console);
@@ -214,12 +211,7 @@ std::function<void()> section(CLI::App& command, Console& console) {
                   "The middle of the picture, µm along the section's right and up")
       ->type_name("RIGHT,UP");
   add_targets(command, options->targets);
-  command.add_option("--colour-by", options->colour_by, "What a colour means")
-      ->check(CLI::IsMember({"type", "layer", "kind", "neuron"}))
-      ->capture_default_str();
-  command.add_option("--background", options->background, "light as in electron micrographs, or dark")
-      ->check(CLI::IsMember({"light", "dark"}))
-      ->capture_default_str();
+  add_look(command, options->look, "light, as in electron micrographs", "type");
   must_be_within(*command.add_option("--through", options->depth,
                                      "How far the plane moves along its normal in a film, µm"),
                  -1e6, 1e6);

@@ -162,7 +162,7 @@ void paint_gaze(QPainter& painter, const QPointF& place, const Ink& ink) {
 }
 
 void mark_selection(frame::Palette& palette, scene::Background background, bool dim) {
-  const bool light = background == scene::Background::light;
+  const bool light = background != scene::Background::dark;
   if (dim) {
     const Vec3 back = light ? Vec3(.80f, .84f, .90f) : Vec3(.006f, .008f, .012f);
     const float kept =

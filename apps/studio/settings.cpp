@@ -138,7 +138,7 @@ constexpr Choice choice_table[] = {
      [](const S& s) { return int(synapse_colour(s) == scene::SynapseColour::target); },
      [](S& s, int i) { s.view.synapses = i ? scene::SynapseColour::target : scene::SynapseColour::sign; }},
     {"Colour", "Background", "Dark for the eye and film, light for print", "B", background_words,
-     [](const S& s) { return int(s.view.background); },
+     [](const S& s) { return int(s.view.background != scene::Background::dark); },
      [](S& s, int i) { s.view.background = scene::Background(i); }},
 };
 

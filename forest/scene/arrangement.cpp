@@ -25,7 +25,8 @@ bool overlap(const Box& a, const Box& b) {
 Paper paper_of(Background background) {
   const Ground ground = ground_of(background);
   return {ground.top, ground.bottom,
-          background == Background::dark ? Vec3(.03f, .05f, .075f) : Vec3(1.f, 1.f, 1.f)};
+          background == Background::dark ? Vec3(.03f, .05f, .075f) : Vec3(1.f, 1.f, 1.f),
+          background == Background::transparent};
 }
 
 Lettering letters_in(const frame::Viewport& picture, Background background) {
@@ -59,8 +60,9 @@ float hidden_by(const Box& box, const frame::Image& image, const Paper& paper) {
     float row = 0.f;
     for (std::size_t x = left; x < right; ++x) {
       const std::uint8_t* p = &image.pixels[4 * (y * image.width + x)];
-      float differs = 0.f;
-      for (int c = 0; c < 3; ++c) differs = std::max(differs, std::abs(float(p[c]) - empty[c]));
+      float differs = paper.clear ? float(p[3]) : 0.f;
+      for (int c = 0; c < 3 && !paper.clear; ++c)
+        differs = std::max(differs, std::abs(float(p[c]) - empty[c]));
       row += std::clamp((differs - seen) / (plain - seen), 0.f, 1.f);
     }
     sum += double(row);
@@ -68,10 +70,12 @@ float hidden_by(const Box& box, const frame::Image& image, const Paper& paper) {
   return float(sum / double((right - left) * (bottom - top)));
 }
 
-float plate_opacity(float hidden) { return opacity_at_most * std::min(1.f, hidden / busy); }
+float plate_opacity(float hidden, const Paper& paper) {
+  return opacity_at_most * (paper.clear ? 1.f : std::min(1.f, hidden / busy));
+}
 
 void paint_plate(frame::Image& image, const Paper& paper, const Box& box) {
-  if (const float opacity = plate_opacity(hidden_by(box, image, paper)); opacity > 0.f)
+  if (const float opacity = plate_opacity(hidden_by(box, image, paper), paper); opacity > 0.f)
     fill(image, box, paper.plate, opacity);
 }
 

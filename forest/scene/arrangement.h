@@ -16,8 +16,9 @@ namespace forest::scene {
 
 /// What a picture is drawn on: from what does not differ from it nothing is hidden.
 struct Paper {
-  Vec3 top, bottom;  // linear light, at the picture's edges
-  Vec3 plate;        // sRGB 0–1, the quiet ground of words, through which the picture is seen faintly
+  Vec3 top, bottom;    // linear light, at the picture's edges
+  Vec3 plate;          // sRGB 0–1, the quiet ground of words, through which the picture is seen faintly
+  bool clear = false;  // nothing: a pixel shows what is opaque, and words need a plate wherever they stand
 };
 Paper paper_of(Background background);
 
@@ -45,8 +46,8 @@ struct Block {
 /// How much of what a picture shows lies in a box, 0–1: the mean over its pixels, of which one counts as far as it is seen to
 /// differ from the paper.
 float hidden_by(const Box& box, const frame::Image& image, const Paper& paper);
-/// Of ground for words that hide so much: none where they hide nothing.
-float plate_opacity(float hidden);
+/// Of ground for words that hide so much: none where they hide nothing, unless the paper is clear.
+float plate_opacity(float hidden, const Paper& paper);
 void paint_plate(frame::Image& image, const Paper& paper, const Box& box);
 
 class Arrangement {

@@ -103,7 +103,7 @@ class Painter {
       : targets_(targets),
         view_(view),
         forest_(targets.forest()),
-        light_(view.background == Background::light),
+        light_(view.background != Background::dark),
         looks_(forest_.instances().size()) {}
 
   Colouring paint() {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "forest/frame/frame.h"
@@ -18,7 +19,11 @@ namespace forest::scene {
 struct View;
 
 enum class ColourBy : std::uint8_t { type, layer, kind, neuron, target, depth };
-enum class Background : std::uint8_t { dark, light };
+inline constexpr std::array<std::string_view, 6> colour_by_words{"type",   "layer",  "kind",
+                                                                 "neuron", "target", "depth"};
+/// What a picture is for: a transparent one for any ground that is put behind it, in the colours of a light one.
+enum class Background : std::uint8_t { dark, light, transparent };
+inline constexpr std::array<std::string_view, 3> background_words{"dark", "light", "transparent"};
 /// What the colours of synapses mean (synapses.h): whether they excite, or whose they are; none: they are not shown.
 enum class SynapseColour : std::uint8_t { none, sign, target };
 

@@ -238,8 +238,12 @@ float distance(const Vec2& p, const Vec2& a, const Vec2& b) {
 
 void blend(frame::Image& image, std::size_t x, std::size_t y, const Vec3& colour, float share) {
   std::uint8_t* pixel = &image.pixels[4 * (y * image.width + x)];
+  const float before = float(pixel[3]) / 255.f, opacity = before + share * (1.f - before);
+  if (!(opacity > 0.f)) return;
+  const float own = share / opacity;  // of the colour: where the picture is clear it is all
   for (int c = 0; c < 3; ++c)
-    pixel[c] = std::uint8_t(std::lround(float(pixel[c]) + share * (255.f * colour[c] - float(pixel[c]))));
+    pixel[c] = std::uint8_t(std::lround(float(pixel[c]) + own * (255.f * colour[c] - float(pixel[c]))));
+  pixel[3] = std::uint8_t(std::lround(255.f * opacity));
 }
 
 // The whole pixels that a stretch touches, within [0, size).

@@ -27,6 +27,7 @@ struct Lettering {
 struct Box {
   float left = 0.f, top = 0.f, right = 0.f, bottom = 0.f;
 };
+/// Over what a pixel shows, as far as that is opaque.
 /// @param colour  sRGB 0–1
 void fill(frame::Image& image, const Box& box, const Vec3& colour, float opacity = 1.f);
 

@@ -390,7 +390,7 @@ std::vector<frame::Overlay> Playback::flashes(const frame::Camera& camera, float
 }
 
 void make_quiet(frame::Palette& palette, Background background) {
-  const bool light = background == Background::light;
+  const bool light = background != Background::dark;
   for (std::uint32_t i = 0; i < synapse_entry; ++i) {
     const Vec3 grey =
         Vec3::Constant(.2126f * palette[i].x() + .7152f * palette[i].y() + .0722f * palette[i].z());

@@ -8,6 +8,7 @@
 #include "forest/core/parallel.h"
 #include "forest/core/round_numbers.h"
 #include "forest/core/srgb.h"
+#include "forest/frame/matte.h"
 #include "forest/scene/lettering.h"
 
 namespace forest::scene {
@@ -24,16 +25,16 @@ struct Tones {
   float tint, rim;         // share of paper in a filled profile; light that its rim keeps
 };
 Tones tones_of(Background background) {
-  return background == Background::light ? Tones{.paper = Vec3::Constant(.86f),
-                                                 .ink = Vec3::Constant(.01f),
-                                                 .plate = Vec3::Constant(.77f),
-                                                 .tint = .30f,
-                                                 .rim = .22f}
-                                         : Tones{.paper = Vec3(.006f, .009f, .014f),
-                                                 .ink = Vec3::Constant(.8f),
-                                                 .plate = Vec3(.016f, .021f, .030f),
-                                                 .tint = 0.f,
-                                                 .rim = .45f};
+  return background != Background::dark ? Tones{.paper = Vec3::Constant(.86f),
+                                                .ink = Vec3::Constant(.01f),
+                                                .plate = Vec3::Constant(.77f),
+                                                .tint = .30f,
+                                                .rim = .22f}
+                                        : Tones{.paper = Vec3(.006f, .009f, .014f),
+                                                .ink = Vec3::Constant(.8f),
+                                                .plate = Vec3(.016f, .021f, .030f),
+                                                .tint = 0.f,
+                                                .rim = .45f};
 }
 
 Vec3 fill_of(const Colouring& colouring, const Profile& p, const Tones& tones) {
@@ -152,7 +153,10 @@ Block scale_block(const SlicePicture& picture, const Tones& tones) {
           }};
 }
 
-Paper paper_of(const Tones& tones) { return {tones.paper, tones.paper, tones.plate.unaryExpr(&srgb)}; }
+Paper paper_of(const SlicePicture& picture, const Tones& tones) {
+  return {tones.paper, tones.paper, tones.plate.unaryExpr(&srgb),
+          picture.background == Background::transparent};
+}
 
 }  // namespace
 
@@ -169,7 +173,8 @@ Slice visible(Slice slice, const Colouring& colouring) {
 
 namespace {
 
-frame::Image paint_profiles(const Slice& slice, const Colouring& colouring, const SlicePicture& picture) {
+frame::Image paint_profiles(const Slice& slice, const Colouring& colouring, const SlicePicture& picture,
+                            const Vec3& behind) {
   const std::size_t width = picture.width_pixels, height = picture.height_pixels;
   const Tones tones = tones_of(picture.background);
   struct Drawn {
@@ -187,7 +192,7 @@ frame::Image paint_profiles(const Slice& slice, const Colouring& colouring, cons
                      std::vector<std::uint8_t>(width * height * 4, 255), 0.};
   parallel_for((height + rows_at_once - 1) / rows_at_once, 1, [&](std::size_t band) {
     const std::size_t first = band * rows_at_once, last = std::min(height, first + rows_at_once);
-    Sketchpad paper(width, first, last, tones.paper);
+    Sketchpad paper(width, first, last, behind);
     const auto fill = [&](std::size_t i, bool rim) {
       const Drawn& d = drawn[i];
       if (d.bottom < double(first) || d.top > double(last)) return;
@@ -213,6 +218,12 @@ frame::Image paint_profiles(const Slice& slice, const Colouring& colouring, cons
   return image;
 }
 
+frame::Image paint_profiles(const Slice& slice, const Colouring& colouring, const SlicePicture& picture) {
+  const auto on = [&](const Vec3& behind) { return paint_profiles(slice, colouring, picture, behind); };
+  return picture.background == Background::transparent ? frame::matted(on(Vec3::Zero()), on(Vec3::Ones()))
+                                                       : on(tones_of(picture.background).paper);
+}
+
 }  // namespace
 
 frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePicture& picture,
@@ -221,7 +232,7 @@ frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePi
   if (!picture.scale_bar) return image;
   const Tones tones = tones_of(picture.background);
   const Block bar = scale_block(picture, tones);
-  places.paint(image, paper_of(tones), {&bar, 1});
+  places.paint(image, paper_of(picture, tones), {&bar, 1});
   return image;
 }
 
@@ -234,7 +245,7 @@ void look_at(const Slice& slice, const Colouring& colouring, const SlicePicture&
              Arrangement& places) {
   const Tones tones = tones_of(picture.background);
   const Block bar = scale_block(picture, tones);
-  places.look_at(paint_profiles(slice, colouring, picture), paper_of(tones), {&bar, 1});
+  places.look_at(paint_profiles(slice, colouring, picture), paper_of(picture, tones), {&bar, 1});
 }
 
 std::string to_svg(const Slice& slice, const Colouring& colouring, const SlicePicture& picture) {
@@ -245,9 +256,10 @@ std::string to_svg(const Slice& slice, const Colouring& colouring, const SlicePi
                        picture.centre.y() + .5 * picture.height - p.y());
   };
   std::string svg = fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" viewBox=\"0 0 {:.6g} {:.6g}\">\n"
-      "<rect width=\"100%\" height=\"100%\" fill=\"{}\"/>\n",
-      picture.width_pixels, picture.height_pixels, wide, picture.height, hex(tones.paper));
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" viewBox=\"0 0 {:.6g} {:.6g}\">\n",
+      picture.width_pixels, picture.height_pixels, wide, picture.height);
+  if (picture.background != Background::transparent)
+    svg += fmt::format("<rect width=\"100%\" height=\"100%\" fill=\"{}\"/>\n", hex(tones.paper));
   for (std::size_t i = 0; i < slice.profiles.size();) {
     const Profile& first = slice.profiles[i];
     svg += fmt::format("<g id=\"neuron-{}\">", first.instance);
@@ -285,10 +297,11 @@ std::string to_svg(const Slice& slice, const Colouring& colouring, const SlicePi
     Block in_pixels = block;
     for (float* length : {&in_pixels.width, &in_pixels.height, &in_pixels.margin})
       *length /= float(small.pixel());
-    places.look_at(seen, paper_of(tones), {&in_pixels, 1});
+    const Paper paper = paper_of(picture, tones);
+    places.look_at(seen, paper, {&in_pixels, 1});
     const Box box = places.place(block, {float(wide), float(picture.height)});
     const Box pixels = places.place(in_pixels, {float(small.width_pixels), float(small.height_pixels)});
-    if (const float opacity = plate_opacity(hidden_by(pixels, seen, paper_of(tones))); opacity > 0.f)
+    if (const float opacity = plate_opacity(hidden_by(pixels, seen, paper), paper); opacity > 0.f)
       svg += fmt::format(
           "<rect x=\"{:.4g}\" y=\"{:.4g}\" width=\"{:.4g}\" height=\"{:.4g}\" fill=\"{}\" "
           "fill-opacity=\"{:.2f}\"/>\n",

@@ -11,7 +11,7 @@
 namespace forest::scene {
 
 /// The picture of a slice: profiles filled in the colour of their neuron, with a darker rim, on light ground as in electron
-/// micrographs, or on dark ground.
+/// micrographs, on dark ground, or with none.
 struct SlicePicture {
   Place centre{0., 0.};  // in the middle of the picture, along the plane's right and up, µm
   double height = 100.;  // of the picture, µm

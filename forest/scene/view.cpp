@@ -26,11 +26,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::array<std::string_view, 6> colour_names{"type", "layer", "kind", "neuron", "target", "depth"};
 constexpr std::array<std::string_view, 7> kind_names{"any",    "dots", "lines", "capsules",
                                                      "somata", "skin", "bricks"};
-constexpr std::array<std::string_view, 2> background_names{"dark", "light"};
-constexpr std::array<std::string_view, 3> synapse_colour_names{"none", "sign", "target"};
+constexpr std::array<std::string_view, 3> synapse_colour_by_words{"none", "sign", "target"};
 constexpr std::array<std::string_view, 2> projection_names{"perspective", "orthographic"};
 
 Vec3 vector_of(const Json& json, const std::string& name, std::string_view key) {
@@ -83,13 +81,13 @@ void read_colour(const Json& json, const std::string& name, Appearance& a) {
       a.colour = rgb;
       return;
     }
-  } else if (const auto found = std::ranges::find(colour_names, word); found != colour_names.end()) {
-    a.colour_by = ColourBy(found - colour_names.begin());
+  } else if (const auto found = std::ranges::find(colour_by_words, word); found != colour_by_words.end()) {
+    a.colour_by = ColourBy(found - colour_by_words.begin());
     return;
   }
   throw InputError(name, 0,
                    fmt::format("'colour' of a target must be a colour as \"#ff8800\", or one of: {}",
-                               fmt::join(colour_names, ", ")));
+                               fmt::join(colour_by_words, ", ")));
 }
 
 // The kinds whose opacity can be told apart, by their number in Segment::meta.
@@ -166,7 +164,7 @@ Json json_of(const Appearance& a) {
   const auto number = [](float value) { return std::round(double(value) * 1e4) / 1e4; };
   if (a.visible) json["visible"] = *a.visible;
   if (a.colour) json["colour"] = fmt::format("#{:06x}", *a.colour);
-  if (a.colour_by) json["colour"] = colour_names[std::size_t(*a.colour_by)];
+  if (a.colour_by) json["colour"] = colour_by_words[std::size_t(*a.colour_by)];
   if (a.kind) json["kind"] = kind_names[std::size_t(*a.kind)];
   Json parts;
   if (a.opacity) parts["all"] = number(*a.opacity);
@@ -398,9 +396,9 @@ Keys<View> keys_of_view() {
       number<V>(
           "acuity_slope", 0.f, 60.f, [](auto& v) -> auto& { return v.detail.acuity_slope; }),
       word<V>(
-          "colour_by", colour_names, [](auto& v) -> auto& { return v.colour_by; }),
+          "colour_by", colour_by_words, [](auto& v) -> auto& { return v.colour_by; }),
       word<V>(
-          "background", background_names, [](auto& v) -> auto& { return v.background; }),
+          "background", background_words, [](auto& v) -> auto& { return v.background; }),
       whole<V>(
           "samples", 1, 1024, [](auto& v) -> auto& { return v.samples; }),
       number<V>(
@@ -417,7 +415,7 @@ Keys<View> keys_of_view() {
           "skin", [](auto& v) -> auto& { return v.skin; })
           .said_if([](const V& v) { return !v.skin; }),
       word<V>(
-          "synapses", synapse_colour_names, [](auto& v) -> auto& { return v.synapses; })
+          "synapses", synapse_colour_by_words, [](auto& v) -> auto& { return v.synapses; })
           .said_if([](const V& v) { return v.synapses != V().synapses; }),
       {"gaze",
        {},
@@ -635,11 +633,11 @@ std::string to_json(const View& view) { return write_all(view, keys_of_view()).d
 // On dark ground through a colour of its own, for between white and the grey of what has no value lies grey; on light ground
 // black, then a green that hardly any map has.
 Vec3 below_threshold(Background background) {
-  return light_of(background == Background::light ? 0xC9CFD8 : 0x383E46);
+  return light_of(background != Background::dark ? 0xC9CFD8 : 0x383E46);
 }
 
 Vec3 on_branches(const ColourMap& map, float t, Background background) {
-  if (background == Background::light) return .85f * map(t);
+  if (background != Background::dark) return .85f * map(t);
   constexpr float least = .07f;
   return (1.f - least) * map(t) + least * Vec3(.8f, .9f, 1.2f);
 }
@@ -760,7 +758,7 @@ View within(View view, const Budget& budget) {
 
 float fog_strength(const View& view) {
   constexpr float on_light = .16f;
-  return view.background == Background::light ? on_light * view.fog : view.fog;
+  return view.background != Background::dark ? on_light * view.fog : view.fog;
 }
 
 Detail detail_for(const View& view, std::uint32_t width, std::uint32_t height) {
@@ -796,8 +794,8 @@ float least_width_of(const Forest& forest, const frame::Camera& camera, std::uin
 }
 
 Ground ground_of(Background background) {
-  return background == Background::light ? Ground{light_of(0xF7F9FC), light_of(0xE6EBF2), light_of(0xEDF1F7)}
-                                         : Ground{light_of(0x0E1420), light_of(0x05070C), light_of(0x0A0F1A)};
+  return background != Background::dark ? Ground{light_of(0xF7F9FC), light_of(0xE6EBF2), light_of(0xEDF1F7)}
+                                        : Ground{light_of(0x0E1420), light_of(0x05070C), light_of(0x0A0F1A)};
 }
 
 frame::Frame compose(const Forest& forest, const View& view, const Colouring& colouring, const Cut& cut,
@@ -809,13 +807,14 @@ frame::Frame compose(const Forest& forest, const View& view, const Colouring& co
   f.palette = colouring.palette;
   f.opacities = colouring.opacities, f.states = colouring.states;
   if (cut.entries)
-    paint(f.palette, view.activity.value_or(ActivityView()), view.background == Background::light);
+    paint(f.palette, view.activity.value_or(ActivityView()), view.background != Background::dark);
   static_cast<frame::Lists&>(f) = cut.lists();
   f.overlays = overlays;
   frame::Style& s = f.style;
   constexpr float rim_on_light = .3f;  // a darkness among dark branches hides their colours
-  s.halo = view.background == Background::light ? rim_on_light * view.halo : view.halo;
-  const Ground ground = ground_of(view.background);
+  s.halo = view.background != Background::dark ? rim_on_light * view.halo : view.halo;
+  Ground ground = ground_of(view.background);
+  if (view.behind) ground.top = ground.bottom = ground.fog = Vec3::Constant(*view.behind);
   s.background_top = ground.top, s.background_bottom = ground.bottom, s.fog_colour = ground.fog;
   if (const Fog fog = fog_of(forest, view.camera, fog_strength(view)); std::isfinite(fog.length))
     s.fog_start = fog.start, s.fog_length = fog.length;

@@ -40,6 +40,8 @@ struct View {
   Detail detail;  // gaze in shares of the width and height here, so that a view fits every picture size
   ColourBy colour_by = ColourBy::type;
   Background background = Background::dark;
+  std::optional<float>
+      behind;  // not part of its text: the light, 0–1, of all ground and fog instead (frame/matte.h)
   std::uint32_t samples = 16;                    // subframes of a still picture
   float fog = 1.f;                               // strength of the depth cue; 0 for none
   float halo = 1.f;                              // strength of the rim around nearer branches; 0 for none

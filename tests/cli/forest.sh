@@ -40,6 +40,21 @@ told files.json 'd["neurons"] == 4 and d["view"]["colour_by"] == "type" and d["v
 "$program" render "$first" --size 320x200 --view '{"eye":[0,300,2000],"target":[0,300,0]}' -o eye.png --json >eye.json
 told eye.json 'd["view"]["colour_by"] == "kind" and d["view"]["projection"] == "perspective"'
 "$program" movie "$first" --seconds 0.2 --size 160x90 --samples 1 -o around.mp4 >/dev/null
+# For slides: nothing behind, and over black or white what is drawn there, in all that has an edge too.
+"$program" render "$first" --size 320x200 --background transparent -o clear.png --json >clear.json
+told clear.json 'd["view"]["background"] == "transparent" and d["covered"] > 0'
+"$program" render "$first" --size 320x200 --background transparent --legend --scale -o words.png >/dev/null
+/usr/bin/python3 - <<'PY' || fail "a transparent picture is not"
+from png_pixels import pixels
+clear, words = pixels("clear.png", 4), pixels("words.png", 4)
+assert clear[0] == (0, 0, 0, 0) and sum(p[3] == 0 for p in clear) > .5 * len(clear)
+assert any(p[3] > 240 for p in clear) and any(0 < p[3] < 128 for p in clear)
+assert sum(a != b for a, b in zip(clear, words)) > 500
+PY
+refuses 'a film has no transparent background' "$program" movie "$first" --background transparent -o no.mp4
+refuses 'a film has no transparent background' "$program" section "$first" --background transparent --through 5 -o no.mp4
+refuses 'a name that ends in .png' "$program" render "$first" --background transparent -o no.jpg
+[ ! -e no.mp4 ] && [ ! -e no.jpg ] || fail "what was refused is there"
 # Neurons as they grew: each picture shows no less than the one before, and the last is what they became.
 $BRAINFOREST grow --grammar bes --count 2 --seed 1 --time-lapse 48 --out growing >/dev/null
 "$program" movie growing --growth --seconds 0.4 --size 320x180 --samples 4 --pictures steps -o growth.mp4 --json >growth.json
