@@ -15,6 +15,7 @@
 #include "forest/io/png.h"
 #include "forest/scene/colour_bar.h"
 #include "forest/scene/gallery.h"
+#include "forest/scene/gauge.h"
 #include "forest/scene/scale_bar.h"
 #include "forest/scene/slice_picture.h"
 
@@ -81,6 +82,8 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
                                                                                    const scene::Eye& from) {
       playback_->colour(cut, from, look, {.window = window_, .states = colouring.states});
     };
+  else if (colouring.gauge)
+    painter = [this, &colouring](scene::Cut& cut, const scene::Eye&) { paint(forest_, colouring, cut); };
   auto start = Clock::now();
   dressing_.begin();
   // A card draws no large pixels: they save work of the processor's kind.
@@ -135,6 +138,8 @@ Artist::Words Artist::words(const scene::View& view, const Marks& marks,
   std::vector<scene::ColourBar> bars;
   if (marks.legend && playback_)
     bars.push_back(scene::bar_of(*playback_, view.activity.value_or(playback_->view()), view.background));
+  if (marks.legend && !playback_ && colouring_)
+    if (const auto of_branches = scene::bar_of(*colouring_, view.background)) bars.push_back(*of_branches);
   if (const auto of_surfaces = scene::bar_of(dressing_.surfaces); marks.legend && of_surfaces)
     bars.push_back(*of_surfaces);
   const bool barred = add(scene::block_of(bars, picture, view.background));

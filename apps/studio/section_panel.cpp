@@ -35,7 +35,7 @@ scene::SlicePicture SectionView::picture() const {
           .width_pixels = std::uint32_t(std::max(1l, std::lround(width() * ratio))),
           .height_pixels = std::uint32_t(std::max(1l, std::lround(height() * ratio))),
           .background = settings_.view.background,
-          .scale_bar = true};
+          .words = true};
 }
 
 void SectionView::show_settings(const Settings& settings) {

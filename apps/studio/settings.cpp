@@ -12,7 +12,9 @@ using S = Settings;
 
 constexpr const char* group_names[] = {"Eye",    "Flight", "Gaze",  "Plane",
                                        "Detail", "Colour", "Depth", "Shown"};
-constexpr const char* colour_words[] = {"Cell type", "Layer", "Kind of branch", "Neuron", "Target", "Depth"};
+constexpr const char* colour_words[] = {"Cell type",    "Layer",  "Kind of branch",
+                                        "Neuron",       "Target", "Depth",
+                                        "Branch order", "Radius", "Distance from the soma"};
 constexpr const char* background_words[] = {"Dark", "Light"};
 constexpr const char* projection_words[] = {"Perspective", "Orthographic"};
 constexpr const char* synapse_words[] = {"Excitatory or inhibitory", "As their target"};

@@ -10,6 +10,8 @@
 
 #include "forest/core/error.h"
 #include "forest/frame/soften.h"
+#include "forest/scene/colour_bar.h"
+#include "forest/scene/gauge.h"
 #include "forest/scene/slice_picture.h"
 
 #include "apps/studio/annotation.h"
@@ -374,6 +376,8 @@ void Viewport::draw_part(const scene::View& of, std::uint32_t first, std::uint32
     painter = [this, shown, window = window_](scene::Cut& cut, const scene::Eye& eye) {
       playback_->colour(cut, eye, shown, {.window = window, .states = colouring_.states});
     };
+  else if (colouring_.gauge)
+    painter = [this](scene::Cut& cut, const scene::Eye&) { paint(forest_, colouring_, cut); };
   if (first == 0 && !layered(view))
     chooser_.choose(scene::Eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h)),
                     colouring_.shown(), painter);
@@ -528,6 +532,8 @@ void Viewport::annotate() {
   if (settings_.legend) {
     Explanations explanations(painter, rect(), ink);
     if (playback_) explanations.add(scene::bar_of(*playback_, activity(), settings_.view.background));
+    if (const auto bar = scene::bar_of(colouring_, settings_.view.background); bar && !playback_)
+      explanations.add(*bar);
     if (const auto bar = scene::bar_of(dressing_.surfaces); bar && dressing_.surfaces.visibility > 0.f)
       explanations.add(*bar);
     if (!playback_) explanations.add(legend());

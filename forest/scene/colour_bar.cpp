@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/round_numbers.h"
+#include "forest/scene/gauge.h"
 #include "forest/scene/playback.h"
 #include "forest/scene/surfaces.h"
 
@@ -56,6 +57,19 @@ std::pair<std::string, std::string> ColourBar::ends() const {
     if (above) ends.second = "≥ " + ends.second;
     return ends;
   }
+}
+
+std::optional<ColourBar> bar_of(const Colouring& colouring, Background background) {
+  if (!colouring.gauge) return std::nullopt;
+  const Gauge& gauge = *colouring.gauge;
+  return ColourBar{.map = &gauge_map(background),
+                   .marks = {screen_of(gauge_soma(background))},
+                   .high = gauge.high,
+                   .above = gauge.above,
+                   .whole = gauge.whole,
+                   .units = gauge.unit,
+                   .title = gauge.title,
+                   .note = "soma"};
 }
 
 std::optional<ColourBar> bar_of(const Surfaces& surfaces) {
@@ -120,7 +134,8 @@ void paint(frame::Image& image, const ColourBar& bar, const Box& place, const Le
     begin = at + half + apart;
   };
   if (bar.threshold) return write(*bar.threshold);
-  for (const double value : ticks(double(bar.low), double(bar.high), 4)) write(float(value));
+  for (const double value : ticks(double(bar.low), double(bar.high), 4))
+    if (!bar.whole || value == std::round(value)) write(float(value));
 }
 
 std::optional<Block> block_of(std::span<const ColourBar> bars, const frame::Viewport& picture,

@@ -22,6 +22,7 @@ struct ColourBar {
   std::vector<Vec3> marks{};                      // sRGB 0–1, of dots before the note
   float low = 0.f, high = 1.f;                    // values at its ends
   bool below = false, above = false;              // whether values lie beyond these, too
+  bool whole = false;                             // only whole numbers are values
   std::string units{};                            // of them; may be empty
   std::optional<float> threshold{};               // what is less is grey
   std::string title{}, note{};                    // above and below; may be empty
@@ -39,6 +40,9 @@ ColourBar bar_of_spikes(const ActivityView& activity, double time, Background ba
 
 /// Whichever of them explains what is played.
 ColourBar bar_of(const Playback& playback, const ActivityView& activity, Background background);
+
+/// Of the gauge that a colouring has; none where it has none.
+std::optional<ColourBar> bar_of(const Colouring& colouring, Background background);
 
 /// Of values on surfaces; none where they have none.
 std::optional<ColourBar> bar_of(const Surfaces& surfaces);

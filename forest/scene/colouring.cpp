@@ -14,6 +14,7 @@
 #include "forest/core/error.h"
 #include "forest/core/srgb.h"
 #include "forest/scene/gallery.h"
+#include "forest/scene/gauge.h"
 #include "forest/scene/view.h"
 
 namespace forest::scene {
@@ -91,6 +92,7 @@ struct Hue {
   };
   std::array<Vec3, 8> kinds;
   std::vector<Name> legend;
+  bool gauged = false;  // branches are in the colours of the gauge
 };
 using OpacityRow = std::array<std::uint8_t, 8>;
 
@@ -245,6 +247,10 @@ class Painter {
       }
       case ColourBy::depth:
         return by_depth();
+      case ColourBy::order:
+      case ColourBy::radius:
+      case ColourBy::distance:
+        return by_gauge(by);
       case ColourBy::target: {
         std::vector<std::uint16_t> of(looks_.size(),
                                       add_hue(on_background(grey), view_.targets.empty() ? "no target" : ""));
@@ -292,6 +298,17 @@ class Painter {
     return [this, layers, of_type = std::move(of_type), hue_of = std::move(hue_of)](std::uint32_t i) {
       return hue_of[of_type[forest_.types()[i]] * layers + forest_.layers()[i]];
     };
+  }
+
+  HueOf by_gauge(ColourBy by) {
+    if (gauge_)
+      throw Error(fmt::format("a picture tells one quantity of branches, not both {} and {}; choose one",
+                              colour_by_words[std::size_t(gauge_->by)], colour_by_words[std::size_t(by)]));
+    gauge_ = std::make_shared<Gauge>(gauge_of(forest_, by));
+    Hue hue{.kinds = {}, .legend = {}, .gauged = true};
+    hue.kinds.fill(gauge_map(view_.background)(.5f));
+    hue.kinds[1] = gauge_soma(view_.background);
+    return [hue = add_hue(std::move(hue))](std::uint32_t) { return hue; };
   }
 
   // Of the soma below the pia: as its circuit tells it of curved tissue, else below the top of the highest layer.
@@ -439,9 +456,10 @@ class Painter {
     for (std::size_t i = 0; i < seen.size(); ++i)
       if (seen[i]) used.push_back(i);
     std::vector<std::size_t> kept = used;
-    if (kept.size() > colour_classes) {
+    const std::size_t classes = gauge_ ? colour_classes - gauge_classes : colour_classes;
+    if (kept.size() > classes) {
       std::ranges::stable_sort(kept, std::greater(), [&](std::size_t i) { return seen[i]; });
-      kept.resize(colour_classes);
+      kept.resize(classes);
       std::ranges::sort(kept);
     }
     std::vector<std::uint8_t> class_of(seen.size());
@@ -451,13 +469,20 @@ class Painter {
                      .opacities = frame::opaque(),
                      .states = {},
                      .parts = {},
-                     .legend = {}};
+                     .legend = {},
+                     .gauge = {}};
     for (std::size_t c = 0; c < kept.size(); ++c) {
       const Hue& hue = hues_[kept[c] / rows];
+      result.gauged |= std::uint16_t(hue.gauged << c);
       for (std::size_t kind = 0; kind < 8; ++kind) {
         result.palette[8 * c + kind] = hue.kinds[kind];
         result.opacities[8 * c + kind] = rows_[kept[c] % rows][kind];
       }
+    }
+    if (result.gauged) {
+      result.gauge = gauge_;
+      for (std::uint32_t i = 0; i < Gauge::steps; ++i)
+        result.palette[gauge_entry + i] = gauge_map(view_.background)(float(i) / float(Gauge::steps - 1));
     }
     explain(used, kept, class_of, rows, result.legend);
     const auto state_of = [&](const Look& look) {
@@ -547,7 +572,8 @@ class Painter {
   std::vector<PartLook> parts_;
   std::vector<Hue> hues_;
   std::vector<OpacityRow> rows_{{255, 255, 255, 255, 255, 255, 255, 255}};
-  std::array<HueOf, 6> schemes_;
+  std::array<HueOf, colour_by_words.size()> schemes_;
+  std::shared_ptr<const Gauge> gauge_;
   std::map<std::pair<std::uint32_t, std::string>, std::uint16_t> flat_;
 };
 
@@ -560,6 +586,11 @@ Vec3 light_of(std::uint32_t rgb) {
 
 Vec3 screen_of(const Vec3& light) {
   return light.unaryExpr([](float c) { return to_srgb(std::clamp(c, 0.f, 1.f)); });
+}
+
+std::uint8_t Colouring::entry(const frame::State& state, std::uint32_t segment, std::uint32_t kind) const {
+  const std::uint8_t step = gauged >> state.colour_class & 1 ? gauge->step[segment] : Gauge::none;
+  return std::uint8_t(step == Gauge::none || kind == 1 ? 8u * state.colour_class + kind : gauge_entry + step);
 }
 
 Colouring colour(const Targets& targets, const View& view) { return Painter(targets, view).paint(); }

@@ -49,9 +49,10 @@ struct Cut {
   std::uint64_t segments = 0;  // drawn
   std::uint32_t far = 0;       // neurons that straws do for, in a part of the forest that is in sight
   std::vector<LeftOut> left_out;
-  // Palette entries of the lists' segments (frame::Entries), where something coloured them (playback.h).
+  // Palette entries of the lists' segments (frame::Entries), where something coloured them (playback.h, gauge.h).
   struct Entries {
     std::vector<std::uint8_t> dots, lines, capsules;
+    bool of_activity = false;  // whose colours the palette is to have then
   };
   std::optional<Entries> entries;
 

@@ -418,4 +418,11 @@ void Forest::Data::number_nodes(const Refuse& refuse) {
   refuse.unless(named == instances);
 }
 
+std::uint32_t end_of(const Forest& forest, const Neuron& n) {
+  std::uint32_t end = n.first_segment + n.original_count;
+  for (const Cluster& c : forest.clusters().subspan(n.first_cluster, n.cluster_count))
+    end = std::max(end, c.first_segment + c.segment_count);
+  return end;
+}
+
 }  // namespace forest::scene

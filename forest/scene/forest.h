@@ -31,7 +31,7 @@ struct Neuron {
   float soma_radius = 0.f;  // µm
 };
 
-/// What is told of a section when it is picked.
+/// What is told of a section when it is picked, and shown in colours (gauge.h).
 struct SectionFacts {
   std::uint32_t parent = 0xffffffffu;  // within its neuron; all ones for a stem
   std::uint32_t kind = 0;              // as SectionKind
@@ -114,5 +114,8 @@ class Forest {
   static Forest check(std::shared_ptr<Data> data, std::span<const std::byte> bytes, const std::string& name);
   std::shared_ptr<const Data> data_;
 };
+
+/// One past the last segment that a neuron's clusters draw.
+std::uint32_t end_of(const Forest& forest, const Neuron& neuron);
 
 }  // namespace forest::scene

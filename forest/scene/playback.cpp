@@ -33,14 +33,6 @@ double milliseconds_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-// One past the last segment that the clusters of a neuron draw.
-std::uint32_t end_of(const Forest& forest, const Neuron& n) {
-  std::uint32_t end = n.first_segment + n.original_count;
-  for (const Cluster& c : forest.clusters().subspan(n.first_cluster, n.cluster_count))
-    end = std::max(end, c.first_segment + c.segment_count);
-  return end;
-}
-
 // Calls take(at, instance, first, count) for what an item draws: segments that follow one another, those between that are not
 // drawn too, of which the first is number `at` of the item; straws are of a neuron each, and have the colour of the segment
 // that they come from.
@@ -242,6 +234,7 @@ void Playback::colour(Cut& cut, const Eye& eye, const ActivityView& view, const 
   const reports::Range& range = activity_.facts().range;
   const std::array entry_of{entries_of(range, view, false), entries_of(range, view, true)};
   Cut::Entries& entries = cut.entries.emplace();
+  entries.of_activity = true;
   const auto paint_list = [&](std::span<const frame::Item> list, std::size_t each,
                               std::vector<std::uint8_t>& out) {
     out.assign(list.size() * each, std::uint8_t(no_value_entry));

@@ -9,6 +9,7 @@
 #include "forest/core/round_numbers.h"
 #include "forest/core/srgb.h"
 #include "forest/frame/matte.h"
+#include "forest/scene/colour_bar.h"
 #include "forest/scene/lettering.h"
 
 namespace forest::scene {
@@ -38,8 +39,9 @@ Tones tones_of(Background background) {
 }
 
 Vec3 fill_of(const Colouring& colouring, const Profile& p, const Tones& tones) {
-  const Vec3& base = colouring.palette[8u * colouring.states[p.instance].colour_class + p.kind];
-  return base.cwiseMin(1.f) * (1.f - tones.tint) + tones.paper * tones.tint;
+  const Vec3& base = colouring.palette[colouring.entry(colouring.states[p.instance], p.segment, p.kind)];
+  const float tint = colouring.gauge ? 0.f : tones.tint;  // a bar tells values by their very colours
+  return base.cwiseMin(1.f) * (1.f - tint) + tones.paper * tint;
 }
 
 float srgb(float c) { return to_srgb(std::clamp(c, 0.f, 1.f)); }
@@ -153,6 +155,30 @@ Block scale_block(const SlicePicture& picture, const Tones& tones) {
           }};
 }
 
+// "z = 0.245 mm", or a point of it and what stands on it where that is no axis.
+std::string position_of(const Plane& plane) {
+  const Vec3 mm = plane.origin / 1000.f;
+  for (int axis = 0; axis < 3; ++axis)
+    if (std::abs(plane.normal[axis]) > .9999f)
+      return fmt::format("{} = {:.6g} mm", "xyz"[axis], mm[axis] + 0.f);
+  const Vec3& n = plane.normal;
+  return fmt::format("through {:.6g}, {:.6g}, {:.6g} mm, across {:.3g}, {:.3g}, {:.3g}", mm.x(), mm.y(),
+                     mm.z(), n.x(), n.y(), n.z());
+}
+
+// What tells how long and what the colours mean.
+std::vector<Block> words_of(const Colouring& colouring, const SlicePicture& picture, const Tones& tones) {
+  std::vector<Block> words;
+  if (!picture.words) return words;
+  if (const auto bar = bar_of(colouring, picture.background)) {
+    const frame::Viewport size{float(picture.width_pixels), float(picture.height_pixels)};
+    if (auto block = block_of(std::span(&*bar, 1), size, picture.background))
+      words.push_back(std::move(*block));
+  }
+  words.push_back(scale_block(picture, tones));
+  return words;
+}
+
 Paper paper_of(const SlicePicture& picture, const Tones& tones) {
   return {tones.paper, tones.paper, tones.plate.unaryExpr(&srgb),
           picture.background == Background::transparent};
@@ -224,15 +250,74 @@ frame::Image paint_profiles(const Slice& slice, const Colouring& colouring, cons
                                                        : on(tones_of(picture.background).paper);
 }
 
+// The same words in the units of a drawing, placed by a glance at its pixels.
+std::string words_in_svg(const Slice& slice, const Colouring& colouring, const SlicePicture& picture) {
+  SlicePicture small = picture;
+  small.width_pixels = glance;
+  small.height_pixels = std::max(1u, std::uint32_t(glance * picture.height_pixels / picture.width_pixels));
+  const frame::Image seen = paint_profiles(slice, colouring, small);
+  const Tones tones = tones_of(picture.background);
+  const Paper paper = paper_of(picture, tones);
+  const frame::Viewport drawing{float(picture.width_pixels * picture.pixel()), float(picture.height)};
+  const double letter = .9 * .035 * picture.height, pad = .5 * letter;
+  Arrangement places;
+  std::string svg = fmt::format("<g font-family=\"sans-serif\" font-size=\"{:.4g}\" fill=\"{}\">\n", letter,
+                                hex(tones.ink));
+  const auto write = [&](double x, double y, const char* anchor, const std::string& words) {
+    svg += fmt::format("<text x=\"{:.4g}\" y=\"{:.4g}\" text-anchor=\"{}\">{}</text>\n", x, y, anchor, words);
+  };
+  // A plate as wide and high inside, where it is needed; the corner that words begin at.
+  const auto stand = [&](Block::Kind kind, Spot usual, double width, double height) {
+    Block block{.kind = kind, .usual = usual};
+    block.width = float(width + 2. * pad), block.height = float(height + 2. * pad), block.margin = float(pad);
+    Block in_pixels = block;
+    for (float* length : {&in_pixels.width, &in_pixels.height, &in_pixels.margin})
+      *length /= float(small.pixel());
+    places.look_at(seen, paper, {&in_pixels, 1});
+    const Box pixels = places.place(in_pixels, {float(small.width_pixels), float(small.height_pixels)}),
+              box = places.place(block, drawing);
+    if (const float opacity = plate_opacity(hidden_by(pixels, seen, paper), paper); opacity > 0.f)
+      svg += fmt::format(
+          "<rect x=\"{:.4g}\" y=\"{:.4g}\" width=\"{:.4g}\" height=\"{:.4g}\" fill=\"{}\" "
+          "fill-opacity=\"{:.2f}\"/>\n",
+          box.left, box.top, block.width, block.height, hex(tones.plate), opacity);
+    return Place(double(box.left) + pad, double(box.top) + pad);
+  };
+  if (const auto bar = bar_of(colouring, picture.background)) {
+    const double width = 16. * letter, thick = .9 * letter;
+    const Place at = stand(Block::values, Spot::top_left, width, 3.4 * letter);
+    write(at.x(), at.y() + .8 * letter, "start", bar->title);
+    write(at.x() + width, at.y() + .8 * letter, "end", bar->units);
+    svg += "<linearGradient id=\"measure\">";
+    constexpr int stops = 10;
+    for (int i = 0; i <= stops; ++i)
+      svg += fmt::format("<stop offset=\"{:g}\" stop-color=\"{}\"/>", i / double(stops),
+                         hex((*bar->map)(float(i) / float(stops))));
+    svg += fmt::format(
+        "</linearGradient>\n<rect x=\"{:.4g}\" y=\"{:.4g}\" width=\"{:.4g}\" height=\"{:.4g}\" "
+        "fill=\"url(#measure)\"/>\n",
+        at.x(), at.y() + 1.2 * letter, width, thick);
+    write(at.x(), at.y() + 3.1 * letter, "start", bar->ends().first);
+    write(at.x() + width, at.y() + 3.1 * letter, "end", bar->ends().second);
+  }
+  const ScaleBar bar = scale_bar_of(picture);
+  const std::string position = position_of(slice.plane);
+  const double label = .6 * letter * double(bar.label.size() + 2),
+               width = std::max(bar.length, label + .55 * letter * double(position.size()));
+  const Place at = stand(Block::scale, Spot::bottom_left, width, 1.4 * letter);
+  write(at.x(), at.y() + .8 * letter, "start", bar.label);
+  write(at.x() + label, at.y() + .8 * letter, "start", position);
+  return svg + fmt::format("<rect x=\"{:.4g}\" y=\"{:.4g}\" width=\"{:.6g}\" height=\"{:.4g}\"/>\n</g>\n",
+                           at.x(), at.y() + 1.15 * letter, bar.length, .25 * letter);
+}
+
 }  // namespace
 
 frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePicture& picture,
                    Arrangement& places) {
   frame::Image image = paint_profiles(slice, colouring, picture);
-  if (!picture.scale_bar) return image;
   const Tones tones = tones_of(picture.background);
-  const Block bar = scale_block(picture, tones);
-  places.paint(image, paper_of(picture, tones), {&bar, 1});
+  places.paint(image, paper_of(picture, tones), words_of(colouring, picture, tones));
   return image;
 }
 
@@ -244,8 +329,8 @@ frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePi
 void look_at(const Slice& slice, const Colouring& colouring, const SlicePicture& picture,
              Arrangement& places) {
   const Tones tones = tones_of(picture.background);
-  const Block bar = scale_block(picture, tones);
-  places.look_at(paint_profiles(slice, colouring, picture), paper_of(picture, tones), {&bar, 1});
+  places.look_at(paint_profiles(slice, colouring, picture), paper_of(picture, tones),
+                 words_of(colouring, picture, tones));
 }
 
 std::string to_svg(const Slice& slice, const Colouring& colouring, const SlicePicture& picture) {
@@ -282,38 +367,7 @@ std::string to_svg(const Slice& slice, const Colouring& colouring, const SlicePi
     }
     svg += "\"/></g>\n";
   }
-  if (picture.scale_bar) {
-    // In the units of the drawing as a picture of it has it in pixels.
-    SlicePicture small = picture;
-    small.width_pixels = glance;
-    small.height_pixels = std::max(1u, std::uint32_t(glance * picture.height_pixels / picture.width_pixels));
-    Arrangement places;
-    const frame::Image seen = paint_profiles(slice, colouring, small);
-    const ScaleBar bar = scale_bar_of(picture);
-    const double letter = .9 * .035 * picture.height, pad = .5 * letter;
-    const double plate = std::max(bar.length, .6 * letter * double(bar.label.size())) + 2. * pad;
-    Block block{.kind = Block::scale, .usual = Spot::bottom_left};
-    block.width = float(plate), block.height = float(1.3 * letter + 2. * pad), block.margin = float(pad);
-    Block in_pixels = block;
-    for (float* length : {&in_pixels.width, &in_pixels.height, &in_pixels.margin})
-      *length /= float(small.pixel());
-    const Paper paper = paper_of(picture, tones);
-    places.look_at(seen, paper, {&in_pixels, 1});
-    const Box box = places.place(block, {float(wide), float(picture.height)});
-    const Box pixels = places.place(in_pixels, {float(small.width_pixels), float(small.height_pixels)});
-    if (const float opacity = plate_opacity(hidden_by(pixels, seen, paper), paper); opacity > 0.f)
-      svg += fmt::format(
-          "<rect x=\"{:.4g}\" y=\"{:.4g}\" width=\"{:.4g}\" height=\"{:.4g}\" fill=\"{}\" "
-          "fill-opacity=\"{:.2f}\"/>\n",
-          box.left, box.top, block.width, block.height, hex(tones.plate), opacity);
-    const double left = double(box.left) + pad, foot = double(box.bottom) - pad;
-    svg += fmt::format(
-        "<rect x=\"{0:.4g}\" y=\"{1:.4g}\" width=\"{2:.6g}\" height=\"{3:.4g}\" fill=\"{4}\"/>\n"
-        "<text x=\"{0:.4g}\" y=\"{5:.4g}\" font-family=\"sans-serif\" font-size=\"{6:.4g}\" "
-        "fill=\"{4}\">{7}</text>\n",
-        left, foot - .25 * letter, bar.length, .25 * letter, hex(tones.ink), foot - .55 * letter, letter,
-        bar.label);
-  }
+  if (picture.words) svg += words_in_svg(slice, colouring, picture);
   return svg + "</svg>\n";
 }
 

@@ -17,7 +17,7 @@ struct SlicePicture {
   double height = 100.;  // of the picture, µm
   std::uint32_t width_pixels = 1280, height_pixels = 720;
   Background background = Background::light;
-  bool scale_bar = true;  // labelled with its length, where it hides least
+  bool words = true;  // a scale bar, and what colours measure (gauge.h), where they hide least
 
   double pixel() const { return height / height_pixels; }  // µm
   Sheet sheet() const;
@@ -26,7 +26,7 @@ struct SlicePicture {
 /// Without the profiles of neurons that are hidden.
 Slice visible(Slice slice, const Colouring& colouring);
 
-/// @param places  where the scale bar stands, in all pictures that share it at one spot
+/// @param places  where the words stand, in all pictures that share it at one spot
 frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePicture& picture,
                    Arrangement& places);
 frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePicture& picture);

@@ -138,7 +138,7 @@ TEST(Slice, ThePictureFillsAsMuchAsTheAreasSay) {
                        .width_pixels = 800,
                        .height_pixels = 900,
                        .background = Background::light,
-                       .scale_bar = false};
+                       .words = false};
   const Slice found = slice(forest, plane, picture.sheet());
   Colouring colouring = colour(forest, ColourBy::type, Background::light);
   colouring.palette.fill(Vec3::Zero());
@@ -151,7 +151,7 @@ TEST(Slice, ThePictureFillsAsMuchAsTheAreasSay) {
   for (std::size_t i = 0; i < image.pixels.size(); i += 4) dark += image.pixels[i] < paper.pixels[i] * 4 / 5;
   EXPECT_NEAR(dark * picture.pixel() * picture.pixel() / known, 1., .1);
 
-  picture.scale_bar = true;
+  picture.words = true;
   EXPECT_NE(paint(found, colouring, picture).pixels, image.pixels);
   // It stands on a plate: over profiles that fill the picture one still sees paper around it.
   SlicePicture inside = picture;

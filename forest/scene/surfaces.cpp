@@ -49,6 +49,7 @@ std::vector<std::uint8_t> free_entries(const Colouring& colouring, bool playing)
   std::bitset<16> used;
   for (const frame::State& state : colouring.states) used.set(state.colour_class & 15);
   for (const Part& part : colouring.parts) used.set(part.state.colour_class & 15);
+  for (std::uint32_t c = 0; c < gauge_classes && colouring.gauge; ++c) used.set(gauge_entry / 8 + c);
   for (std::uint32_t entry = 0; entry < synapse_entry; ++entry)
     if (playing ? entry >= flash_entry + flash_steps : !used[entry / 8]) list.push_back(std::uint8_t(entry));
   return list;

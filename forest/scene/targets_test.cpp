@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -274,7 +275,7 @@ TEST(Appearance, ThereMayBeMoreHuesThanThereIsRoomFor) {
     c.instances[i].layer = std::uint32_t(i % 2 ? 60'999 : i);
   const Forest f = Forest::from_bytes(pack(c, testing::sample_neurons()));
   for (const ColourBy by : {ColourBy::type, ColourBy::layer, ColourBy::kind, ColourBy::neuron,
-                            ColourBy::target, ColourBy::depth}) {
+                            ColourBy::target, ColourBy::depth, ColourBy::order}) {
     View view;
     view.colour_by = ColourBy::layer;
     view.targets.emplace_back().name = "first";
@@ -306,11 +307,11 @@ TEST(Appearance, LayersOfATypeAreOneEntryOfTheLegend) {
 TEST(Appearance, EveryWayOfColouringKeepsTheContract) {
   const Forest f = sample();
   const Targets targets(f);
-  for (const char* word : {"type", "layer", "kind", "neuron", "target", "depth"}) {
+  for (const std::string_view word : colour_by_words) {
     View view =
-        with(std::string(R"([{"name":"first","opacity":0.5},{"name":"second","colour":")") + word + "\"}]");
+        with(fmt::format(R"([{{"name":"first","opacity":0.5}},{{"name":"second","colour":"{}"}}])", word));
     view.colour_by =
-        parse_view(std::string(R"({"eye":[0,0,1],"target":[0,0,0],"colour_by":")") + word + "\"}").colour_by;
+        parse_view(fmt::format(R"({{"eye":[0,0,1],"target":[0,0,0],"colour_by":"{}"}})", word)).colour_by;
     const Colouring c = colour(targets, view);
     const Cut cut = choose(f, Eye(view.camera, {320, 200}, view.detail), c.shown());
     EXPECT_NO_THROW(frame::check(compose(f, view, c, cut, 320, 200), f.geometry())) << word;

@@ -806,7 +806,7 @@ frame::Frame compose(const Forest& forest, const View& view, const Colouring& co
   f.least_width = view.least_width.value_or(least_width_of(forest, view.camera, width, height));
   f.palette = colouring.palette;
   f.opacities = colouring.opacities, f.states = colouring.states;
-  if (cut.entries)
+  if (cut.entries && cut.entries->of_activity)
     paint(f.palette, view.activity.value_or(ActivityView()), view.background != Background::dark);
   static_cast<frame::Lists&>(f) = cut.lists();
   f.overlays = overlays;

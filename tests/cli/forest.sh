@@ -55,6 +55,15 @@ refuses 'a film has no transparent background' "$program" movie "$first" --backg
 refuses 'a film has no transparent background' "$program" section "$first" --background transparent --through 5 -o no.mp4
 refuses 'a name that ends in .png' "$program" render "$first" --background transparent -o no.jpg
 [ ! -e no.mp4 ] && [ ! -e no.jpg ] || fail "what was refused is there"
+# What branches measure from place to place.
+for what in order radius distance; do
+  "$program" render grown --size 320x200 --colour-by $what -o by_$what.png --json >by.json
+  told by.json "d['view']['colour_by'] == '$what' and d['covered'] > 0"
+  "$program" section "$first" --size 320x200 --height 300 --colour-by $what -o cut_$what.png >/dev/null
+done
+! cmp -s by_order.png by_radius.png && ! cmp -s by_order.png by_distance.png || fail "all measures look alike"
+refuses 'one quantity of branches' "$program" render "$first" --colour-by order \
+  --view '{"targets":[{"name":"all","colour":"radius"}]}' -o no.png
 # Neurons as they grew: each picture shows no less than the one before, and the last is what they became.
 $BRAINFOREST grow --grammar bes --count 2 --seed 1 --time-lapse 48 --out growing >/dev/null
 "$program" movie growing --growth --seconds 0.4 --size 320x180 --samples 4 --pictures steps -o growth.mp4 --json >growth.json
