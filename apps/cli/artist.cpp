@@ -293,9 +293,11 @@ void add_look(CLI::App& command, Look& look, const char* usual_background, const
 }
 
 void add_marks(CLI::App& command, Marks& marks) {
-  command.add_flag("!--no-legend", marks.legend,
-                   "Leave out what the colours of values mean (small pictures do so by themselves)");
-  command.add_flag("--legend", marks.names, "Name the colours of neurons, too: types, layers, targets …");
+  auto* none =
+      command.add_flag("!--no-legend", marks.legend,
+                       "Leave out what the colours of values mean (small pictures do so by themselves)");
+  command.add_flag("--legend", marks.names, "Name the colours of neurons, too: types, layers, targets …")
+      ->excludes(none);
   command.add_flag("--scale", marks.scale, "Draw a scale bar, true at the depth of what the camera looks at");
 }
 

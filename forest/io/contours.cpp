@@ -15,6 +15,7 @@
 #include "forest/core/error.h"
 #include "forest/core/json.h"
 #include "forest/core/number.h"
+#include "forest/core/round_numbers.h"
 #include "forest/io/plain_text.h"
 #include "forest/io/words.h"
 
@@ -523,6 +524,9 @@ std::string write_svg(const ContourStack& stack, const Section& section, const S
   if (!(low.x() <= high.x())) low = Place::Zero(), high = Place::Constant(1000.);
   const Place border = Place::Constant(.02 * (high - low).maxCoeff() + 1.);
   low -= border, high += border;
+  // Words have a strip of their own, below.
+  const double wide = high.x() - low.x(), letter = std::min((high - low).maxCoeff() / 45., wide / 28.);
+  low.y() -= 2. * letter;
   const Place extent = high - low;
   std::string text = fmt::format(
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}mm\" "
@@ -544,6 +548,16 @@ std::string write_svg(const ContourStack& stack, const Section& section, const S
   };
   if (behind) group(*behind, true);
   group(section, false);
+  const double bar = round_below(.25 * wide), left = low.x() + letter, base = -low.y() - .8 * letter;
+  text += fmt::format(
+      "<g data-words=\"scale\" font-family=\"sans-serif\" font-size=\"{0:.6g}\" fill=\"#444\">\n"
+      "<path d=\"M{1:.8g} {2:.8g}v{3:.6g}h{4}v-{3:.6g}\" fill=\"none\" stroke=\"#444\" "
+      "stroke-width=\"{5:.4g}\"/>\n"
+      "<text x=\"{6:.8g}\" y=\"{7:.8g}\">{8}</text>\n"
+      "<text x=\"{9:.8g}\" y=\"{7:.8g}\" text-anchor=\"end\">{10} = {11} mm</text>\n</g>\n",
+      letter, left, base - .4 * letter, .4 * letter, number(bar), .1 * letter, left + bar + .6 * letter, base,
+      bar < 1000. ? number(bar) + " µm" : number(bar / 1000.) + " mm", high.x() - letter,
+      axis_names[std::size_t(stack.axis)], number(section.at / 1000.));
   return text + "</svg>\n";
 }
 
@@ -614,7 +628,8 @@ ReadContours read_svg(std::string_view text, const std::string& name) {
     for (pugi::xml_node node = top.first_child(); node;) {
       const std::string_view kind = node.name();
       const bool unseen = hidden(node),
-                 skipped = unseen || node.attribute("data-behind") || kind == "defs" || kind == "clipPath",
+                 skipped = unseen || node.attribute("data-behind") || node.attribute("data-words") ||
+                           kind == "defs" || kind == "clipPath",
                  container = kind == "g" || kind == "a" || kind == "switch";
       if (node.attribute("transform") && !skipped && (container || kind == "path"))
         throw InputError(

@@ -2,6 +2,7 @@
 #include "forest/io/contours.h"
 
 #include <cmath>
+#include <regex>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -49,6 +50,25 @@ TEST(Contours, ComeBackFromDrawingsToTheLastBit) {
   std::swap(drawings.front(), drawings.back());
   ContourStack again = gathered(drawings, "drawn");
   EXPECT_EQ(again, stack);
+}
+
+TEST(Contours, DrawingsHaveAScaleBarAsLongAsItSaysAndTellWhereTheyAre) {
+  ContourStack stack = curves();
+  stack.axis = cortex::Axis::z;
+  stack.sections.resize(1);
+  for (const double scale : {1., .05, 60.}) {
+    for (auto& contour : stack.sections[0].contours)
+      for (Place& p : contour.curve.points) p *= scale;
+    stack.sections[0].at = -14'250.;
+    const std::string drawing = write_svg(stack, stack.sections[0]);
+    EXPECT_NE(drawing.find(">z = -14.25 mm<"), std::string::npos);
+    std::smatch bar, label;
+    ASSERT_TRUE(
+        std::regex_search(drawing, bar, std::regex("data-words=[^\n]*\n<path d=\"M[^h]*h([0-9.e+]+)v")));
+    ASSERT_TRUE(std::regex_search(drawing, label, std::regex(">([0-9.]+) (µm|mm)</text>")));
+    EXPECT_DOUBLE_EQ(std::stod(bar[1]), std::stod(label[1]) * (label[2] == "mm" ? 1000. : 1.));
+    EXPECT_EQ(read_contours(drawing, "c.svg").stack, stack) << "words are no contours";
+  }
 }
 
 TEST(Contours, CutOffAnywhereAreRefused) {

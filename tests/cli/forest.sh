@@ -55,6 +55,7 @@ refuses 'a film has no transparent background' "$program" movie "$first" --backg
 refuses 'a film has no transparent background' "$program" section "$first" --background transparent --through 5 -o no.mp4
 refuses 'a name that ends in .png' "$program" render "$first" --background transparent -o no.jpg
 [ ! -e no.mp4 ] && [ ! -e no.jpg ] || fail "what was refused is there"
+fails_with 2 'excludes' "$program" render "$first" --legend --no-legend -o no.png
 # What branches measure from place to place.
 for what in order radius distance; do
   "$program" render grown --size 320x200 --colour-by $what -o by_$what.png --json >by.json
