@@ -90,7 +90,7 @@ void film(const Options& options, const scene::Forest& forest, const Plane& plan
   io::Film film(options.out, picture.width_pixels, picture.height_pixels, options.rate);
   const auto slice_at = [&](float share) {
     return scene::visible(scene::slice(forest, plane.moved(float(options.depth) * share), picture.sheet()),
-                   colouring);
+                          colouring);
   };
   constexpr int looks = 8;
   scene::Arrangement places;  // of the scale bar, where it hides least in all of the film
