@@ -377,7 +377,7 @@ void Viewport::draw_part(const scene::View& of, std::uint32_t first, std::uint32
       playback_->colour(cut, eye, shown, {.window = window, .states = colouring_.states});
     };
   else if (colouring_.gauge)
-    painter = [this](scene::Cut& cut, const scene::Eye&) { paint(forest_, colouring_, cut); };
+    painter = [this](scene::Cut& cut, const scene::Eye&) { scene::paint(forest_, colouring_, cut); };
   if (first == 0 && !layered(view))
     chooser_.choose(scene::Eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h)),
                     colouring_.shown(), painter);
