@@ -23,6 +23,7 @@ struct Watch {
   std::mutex mutex;
   std::multiset<fs::path> paths;
   int pipe[2] = {-1, -1};
+  pid_t waits = 0;  // the program whose thread waits: what is forked off has none, and other paths
   std::array<bool, interruptions.size()> ours{};
 };
 Watch& watch() {
@@ -60,8 +61,10 @@ void wait_for_interruption() {
 Unfinished::Unfinished(fs::path path) : path_(std::move(path)) {
   Watch& w = watch();
   const std::lock_guard lock(w.mutex);
-  if (w.pipe[0] < 0) {
+  if (w.waits != ::getpid()) {
     if (::pipe2(w.pipe, O_CLOEXEC) != 0) return;
+    w.waits = ::getpid();
+    w.paths.clear();
     std::thread(wait_for_interruption).detach();
   }
   if (w.paths.empty())
