@@ -212,7 +212,7 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
     if (plan.gaze) view.detail.gaze = plan.gaze->at(1000. * i / plan.frames_per_second);
     if (activity) {
       view.activity = activity;
-      view.activity->time = plan.from + i * picture_ms;
+      view.activity->time = std::min(plan.from + i * picture_ms, artist.playback()->end());
     }
     return view;
   };

@@ -342,7 +342,14 @@ std::function<void()> movie(CLI::App& command, Console& console) {
       play(artist, options->activity, *look, console);
       if (!told) look->activity->time = artist.playback()->begin();  // all of it
       plan.from = *look->activity->time;
-      plan.rate = options->rate.value_or((artist.playback()->end() - plan.from) / plan.seconds);
+      const double left = artist.playback()->end() - plan.from;
+      plan.rate = options->rate.value_or(left / plan.seconds);
+      if (const double still = plan.seconds - left / plan.rate; still > .05 * plan.seconds)
+        console.warn(
+            fmt::format("the simulation ends {:.1f} s before the film does, which shows its last moment "
+                        "until then; give a "
+                        "lower --rate or fewer --seconds",
+                        still));
     }
     const scene::CameraPath path =
         views.empty() ? scene::walk(forest, states_of(artist.targets(), options->targets), aspect)
