@@ -126,15 +126,15 @@ Environment::Stratum Environment::stratum(const Place& place) const {
 
 Environment::Nearest Environment::nearest_soma(const Place& place, const Place& own) const {
   Nearest nearest;
+  const auto way_to = [&](std::uint32_t i) -> Place { return somata_[i].centre.cast<double>() - place; };
   const auto look = [&](std::uint32_t i) {
     const Sphere& soma = somata_[i];
-    const Place way = soma.centre.cast<double>() - place;
-    const double distance = way.norm() - double(soma.radius);
+    const double distance = way_to(i).norm() - double(soma.radius);
     // Of two as near the first, so that the grid does not matter.
     if (distance > nearest.distance || (distance == nearest.distance && nearest.soma && i > *nearest.soma) ||
         encloses(soma, own))
       return;
-    nearest = {distance, way.stableNormalized(), i};
+    nearest.distance = distance, nearest.soma = i;
   };
   if (somata_.empty()) return nearest;
   // Shells of cells from the one at the place outwards. Within the k-th all are at least k - 1 cells away.
@@ -145,14 +145,22 @@ Environment::Nearest Environment::nearest_soma(const Place& place, const Place& 
     const Eigen::Vector3i low = (middle.array() - k).matrix(), high = (middle.array() + k).matrix();
     for (int z = std::max(low[2], 0); z <= std::min(high[2], size_[2] - 1); ++z)
       for (int y = std::max(low[1], 0); y <= std::min(high[1], size_[1] - 1); ++y) {
-        const bool side = z == low[2] || z == high[2] || y == low[1] || y == high[1];
-        for (int x = std::max(low[0], 0); x <= std::min(high[0], size_[0] - 1); ++x) {
-          if (!side && x != low[0] && x != high[0]) continue;
-          const std::size_t cell = row(y, z) + std::size_t(x);
-          for (std::uint32_t i = first_[cell]; i < first_[cell + 1]; ++i) look(order_[i]);
+        const std::size_t cell = row(y, z);
+        const auto look_along = [&](int from, int to) {
+          for (std::uint32_t i = first_[cell + std::size_t(std::max(from, 0))],
+                             end = first_[cell + std::size_t(std::min(to, size_[0] - 1)) + 1];
+               i < end; ++i)
+            look(order_[i]);
+        };
+        if (z == low[2] || z == high[2] || y == low[1] || y == high[1]) {
+          look_along(low[0], high[0]);
+        } else {
+          if (low[0] >= 0) look_along(low[0], low[0]);
+          if (high[0] < size_[0]) look_along(high[0], high[0]);
         }
       }
   }
+  if (nearest.soma) nearest.direction = way_to(*nearest.soma).stableNormalized();
   return nearest;
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The word is a doubly linked list in an arena, and only modules that some production rewrites are visited,
-// so that a step costs what it changes, not what has grown before. A step first evaluates all successors
-// beside the old word, which contexts still see unchanged, and then links them in.
+// Only modules that some production rewrites are visited, so that a step costs what it changes, not what has grown before.
+// A step first evaluates all successors beside the old word, which contexts still see unchanged, and then links them in.
 #include "forest/lsystem/derive.h"
 
 #include <algorithm>
@@ -10,25 +9,21 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/lsystem/answers.h"
+#include "forest/lsystem/growing_word.h"
 #include "forest/lsystem/turtle.h"
 
 namespace forest::lsystem {
 namespace {
 
-constexpr std::uint32_t none = 0xffffffffu;
-constexpr Symbol blank = 0xffff;                        // where a module has vanished
+using Place = GrowingWord::Place;
+constexpr Place none = GrowingWord::none;
 constexpr std::uint32_t candidate_stream = 0x63616e64;  // "cand"
 constexpr auto push_symbol = Symbol(Action::push), pop_symbol = Symbol(Action::pop);
 
-struct Node {
-  Symbol symbol = blank;
-  std::uint16_t count = 0;
-  std::uint32_t first = 0;  // parameter
-  std::uint32_t previous = none, next = none;
-};
-
 struct Change {
-  std::uint32_t node, begin, count;  // the successor lies at nodes begin to begin + count - 1
+  Place old, begin;
+  std::uint32_t count;  // modules of the successor; they lie at begin, none when it stays
 };
 
 struct Candidate {
@@ -41,26 +36,28 @@ struct Candidate {
 struct Deriver::State {
   const Grammar& grammar;
   cortex::Site site;
-  std::vector<Node> nodes;
-  std::vector<double> parameters;
-  std::vector<std::uint32_t> active, later;  // nodes that productions may rewrite, in the order of the word
+  GrowingWord growing;
+  Answers answers;
+  std::vector<Place> active, later;  // modules that productions may rewrite, in the order of the word
   std::vector<Change> changes;
-  std::size_t live = 0;  // modules in the word
   std::vector<double> slots, stack, cell;
   std::vector<Candidate> candidates;
   std::vector<std::size_t> written;  // modules, by production
-  std::vector<std::uint32_t> seen;   // nodes matched by contexts
+  std::vector<Place> seen;           // modules matched by contexts
   Word word;
 
   State(const Grammar& g, const cortex::Site& where)
       : grammar(g),
         site(where),
+        answers(g, site),
         slots(g.slots + 1),
         stack(g.stack + 1),
         cell(g.cell_values),
         written(g.productions.size()) {}
 
-  bool rewritten(Symbol s) const { return s != blank && !grammar.productions_of[s].empty(); }
+  bool rewritten(Place n) const {
+    return growing[n].symbol != GrowingWord::blank && !grammar.productions_of[growing[n].symbol].empty();
+  }
 
   [[noreturn]] void fail(const Production& p, std::string_view what) const {
     throw InputError(grammar.file, p.line, fmt::format("production {} {}", p.id, what));
@@ -75,64 +72,58 @@ struct Deriver::State {
     }
   }
 
-  // Appends modules whose parameters lie on the stack; false when a number is not finite.
-  bool append(std::span<const Shape> shapes) {
+  // The first of these modules that would have a parameter on the stack that is not a finite number.
+  const Shape* unfit(std::span<const Shape> shapes) const {
     const double* value = stack.data();
-    for (const Shape& s : shapes) {
-      nodes.push_back({s.symbol, s.count, std::uint32_t(parameters.size()), none, none});
-      for (std::uint16_t i = 0; i < s.count; ++i, ++value) {
-        if (!std::isfinite(*value)) return false;
-        parameters.push_back(*value);
-      }
-    }
-    return true;
+    for (const Shape& s : shapes)
+      for (std::uint16_t i = 0; i < s.count; ++i)
+        if (!std::isfinite(*value++)) return &s;
+    return nullptr;
   }
 
   void begin(Random& random, std::uint32_t candidate) {
-    nodes.clear(), parameters.clear(), active.clear();
+    growing.clear(), answers.begin(), active.clear();
     std::ranges::fill(written, 0);
     evaluate(grammar.cell, grammar.cell_line, random);
     std::copy_n(slots.begin(), cell.size(), cell.begin());
     for (const Total& t : grammar.totals) cell[t.place] = 0.;
     if (candidate > 0) random = Random(random.seed(), random.item(), candidate_stream + candidate);
     evaluate(grammar.axiom_values, grammar.axiom_line, random);
-    if (!append(grammar.axiom))
+    if (unfit(grammar.axiom))
       throw InputError(grammar.file, grammar.axiom_line,
                        "the axiom has a parameter that is not a finite number; mend its expression");
-    live = nodes.size();
-    if (live > grammar.limit) runaway();
-    for (std::uint32_t i = 0; i < nodes.size(); ++i) {
-      nodes[i].previous = i == 0 ? none : i - 1;
-      nodes[i].next = i + 1 == nodes.size() ? none : i + 1;
-      if (rewritten(nodes[i].symbol)) active.push_back(i);
-    }
+    growing.lay(grammar.axiom, stack.data());
+    growing.start();
+    if (growing.modules() > grammar.limit) runaway();
+    for (Place n = growing.begin(); n != none; n = growing[n].next)
+      if (rewritten(n)) active.push_back(n);
   }
 
-  bool passed_over(std::uint32_t n) const {
-    return nodes[n].symbol == blank || grammar.ignored[nodes[n].symbol];
+  bool passed_over(Place n) const {
+    return growing[n].symbol == GrowingWord::blank || grammar.ignored[growing[n].symbol];
   }
 
   // From a bracket to its partner, forwards or backwards.
-  std::uint32_t partner(std::uint32_t n, Symbol open, Symbol close, std::uint32_t Node::*onward) const {
-    for (int depth = 0; n != none; n = nodes[n].*onward) {
-      if (nodes[n].symbol == open) ++depth;
-      if (nodes[n].symbol == close && --depth == 0) return n;
+  Place partner(Place n, Symbol open, Symbol close, Place GrowingWord::Node::*onward) const {
+    for (int depth = 0; n != none; n = growing[n].*onward) {
+      if (growing[n].symbol == open) ++depth;
+      if (growing[n].symbol == close && --depth == 0) return n;
     }
     return none;
   }
 
-  bool fits(std::uint32_t n, const Shape& s) const {
-    return n != none && nodes[n].symbol == s.symbol && nodes[n].count == s.count;
+  bool fits(Place n, const Shape& s) const {
+    return n != none && growing[n].symbol == s.symbol && growing[n].count == s.count;
   }
 
   // The modules between the root and this one, past the branches that leave on the way.
-  bool left_matches(std::uint32_t n, const std::vector<Shape>& pattern) {
+  bool left_matches(Place n, const std::vector<Shape>& pattern) {
     for (std::size_t i = pattern.size(); i-- > 0;) {
-      for (n = nodes[n].previous; n != none; n = nodes[n].previous) {
-        if (nodes[n].symbol == pop_symbol) {
-          n = partner(n, pop_symbol, push_symbol, &Node::previous);
+      for (n = growing[n].previous; n != none; n = growing[n].previous) {
+        if (growing[n].symbol == pop_symbol) {
+          n = partner(n, pop_symbol, push_symbol, &GrowingWord::Node::previous);
           if (n == none) return false;
-        } else if (nodes[n].symbol != push_symbol && !passed_over(n)) {
+        } else if (growing[n].symbol != push_symbol && !passed_over(n)) {
           break;
         }
       }
@@ -144,22 +135,22 @@ struct Deriver::State {
 
   // The modules that follow on this branch; a bracketed part of the pattern is matched with the branch that
   // stands there.
-  bool right_matches(std::uint32_t n, const std::vector<Shape>& pattern, std::size_t offset) {
+  bool right_matches(Place n, const std::vector<Shape>& pattern, std::size_t offset) {
     const auto onward = [&] {
-      do n = nodes[n].next;
+      do n = growing[n].next;
       while (n != none && passed_over(n));
     };
     onward();
     for (std::size_t i = 0; i < pattern.size(); ++i) {
       const Symbol wanted = pattern[i].symbol;
       if (wanted == pop_symbol) {  // the rest of the branch does not matter
-        for (int depth = 1; n != none; n = nodes[n].next) {
-          if (nodes[n].symbol == push_symbol) ++depth;
-          if (nodes[n].symbol == pop_symbol && --depth == 0) break;
+        for (int depth = 1; n != none; n = growing[n].next) {
+          if (growing[n].symbol == push_symbol) ++depth;
+          if (growing[n].symbol == pop_symbol && --depth == 0) break;
         }
       } else if (wanted != push_symbol) {
-        while (n != none && nodes[n].symbol == push_symbol) {
-          n = partner(n, push_symbol, pop_symbol, &Node::next);
+        while (n != none && growing[n].symbol == push_symbol) {
+          n = partner(n, push_symbol, pop_symbol, &GrowingWord::Node::next);
           if (n != none) onward();
         }
       }
@@ -172,17 +163,16 @@ struct Deriver::State {
 
   // Whether the production fits at the node; then its formal parameters have their values.
   bool matches(const Production& p, std::uint32_t n) {
-    if (nodes[n].count != p.predecessor.count) return false;
+    if (growing[n].count != p.predecessor.count) return false;
     if (p.left.empty() && p.right.empty()) {
-      std::copy_n(parameters.begin() + nodes[n].first, nodes[n].count, slots.begin());
+      std::ranges::copy(growing.of(n), slots.begin());
       return true;
     }
     seen.resize(p.left.size() + 1 + p.right.size());
     if (!left_matches(n, p.left) || !right_matches(n, p.right, p.left.size() + 1)) return false;
     seen[p.left.size()] = n;
     auto slot = slots.begin();
-    for (const std::uint32_t s : seen)
-      slot = std::copy_n(parameters.begin() + nodes[s].first, nodes[s].count, slot);
+    for (const Place s : seen) slot = std::ranges::copy(growing.of(s), slot).out;
     return true;
   }
 
@@ -194,11 +184,11 @@ struct Deriver::State {
 
   // The production that rewrites the node; its parameters are in the slots. Null when the node stays as it
   // is.
-  const Production* choose(std::uint32_t n, Random& random) {
+  const Production* choose(Place n, Random& random) {
     const Production *certain = nullptr, *last = nullptr;
     candidates.clear();
     double total = 0.;
-    for (const std::uint32_t index : grammar.productions_of[nodes[n].symbol]) {
+    for (const std::uint32_t index : grammar.productions_of[growing[n].symbol]) {
       const Production& p = grammar.productions[index];
       if ((certain && p.weight.empty()) || !matches(p, n)) continue;
       last = &p;
@@ -230,9 +220,9 @@ struct Deriver::State {
     for (const Total& t : grammar.totals) {
       const std::size_t keys = t.key < 0 ? 1 : std::size_t(total_keys);
       std::fill_n(cell.begin() + std::ptrdiff_t(t.place), keys, 0.);
-      for (const std::uint32_t n : active) {
+      for (const Place n : active) {
         if (!fits(n, t.module)) continue;
-        std::copy_n(parameters.begin() + nodes[n].first, nodes[n].count, slots.begin());
+        std::ranges::copy(growing.of(n), slots.begin());
         const double key = t.key < 0 ? 0. : slots[std::size_t(t.key)],
                      value = evaluate(t.value, t.line, random)[-1];
         if (key >= 0. && key < double(keys) && key == std::floor(key))
@@ -244,8 +234,8 @@ struct Deriver::State {
   void step(Random& random) {
     if (!grammar.totals.empty()) sum(random);
     changes.clear(), later.clear();
-    std::size_t will_live = live;
-    for (const std::uint32_t n : active) {
+    std::size_t will_live = growing.modules();
+    for (const Place n : active) {
       const Production* p = choose(n, random);
       if (!p) {
         changes.push_back({n, none, 0});
@@ -253,20 +243,19 @@ struct Deriver::State {
       }
       if (!p->bindings.empty()) evaluate(p->bindings, p->line, random);
       if (!p->values.empty()) evaluate(p->values, p->line, random);
-      const auto begin = std::uint32_t(nodes.size()), count = std::uint32_t(p->successor.size());
-      if (!append(p->successor))
+      if (const Shape* odd = unfit(p->successor))
         fail(*p, fmt::format(
                      "gives {} a parameter that is not a finite number; keep its expressions in their domain",
-                     grammar.symbols[nodes.back().symbol]));
-      changes.push_back({n, begin, count});
+                     grammar.symbols[odd->symbol]));
+      const auto count = std::uint32_t(p->successor.size());
+      changes.push_back({n, growing.lay(p->successor, stack.data()), count});
       written[std::size_t(p - grammar.productions.data())] += count;
       will_live = will_live + count - 1;
       if (will_live > grammar.limit) runaway();
     }
     for (const Change& c : changes) link(c);
-    live = will_live;
     active.swap(later);
-    if (nodes.size() > 100'000 && nodes.size() > 4 * live) compact();
+    if (growing.sparse()) compact();
   }
 
   [[noreturn]] void runaway() const {
@@ -281,64 +270,17 @@ struct Deriver::State {
   }
 
   void link(const Change& c) {
-    if (c.begin == none) return later.push_back(c.node);
-    if (c.count == 0) {
-      nodes[c.node].symbol = blank, nodes[c.node].count = 0;
-      return;
-    }
-    const auto take = [&](std::uint32_t n) {
-      if (rewritten(nodes[n].symbol)) later.push_back(n);
-    };
-    Node& old = nodes[c.node];
-    const Node& head = nodes[c.begin];
-    const std::uint32_t after = old.next;
-    old.symbol = head.symbol, old.count = head.count, old.first = head.first;
-    take(c.node);
-    std::uint32_t at = c.node;
-    for (std::uint32_t n = c.begin + 1; n < c.begin + c.count; ++n) {
-      nodes[at].next = n, nodes[n].previous = at;
-      take(at = n);
-    }
-    nodes[at].next = after;
-    if (after != none) nodes[after].previous = at;
+    if (c.begin == none) return later.push_back(c.old);
+    growing.replace(c.old, c.begin, c.count);
+    Place n = c.old;
+    for (std::uint32_t i = 0; i < c.count; ++i, n = growing[n].next)
+      if (rewritten(n)) later.push_back(n);
   }
 
-  // Fills in the answers to ?P, ?H and their like.
-  void answer() {
-    flatten();
-    lsystem::answer(word, grammar, site);
-    std::size_t at = 0;
-    for (std::uint32_t n = nodes.empty() ? none : 0; n != none; n = nodes[n].next) {
-      if (nodes[n].symbol == blank) continue;
-      const Module& m = word.modules[at++];
-      if (const Symbol s = grammar.drawn_as[m.symbol];
-          s < turtle_symbols().size() && is_question(turtle_symbols()[s].action))
-        std::copy_n(word.parameters.begin() + m.first, m.count, parameters.begin() + nodes[n].first);
-    }
-  }
-
-  void flatten() {
-    word.modules.clear(), word.parameters.clear();
-    word.modules.reserve(live);
-    for (std::uint32_t n = nodes.empty() ? none : 0; n != none; n = nodes[n].next) {
-      if (nodes[n].symbol == blank) continue;
-      word.modules.push_back({nodes[n].symbol, nodes[n].count, std::uint32_t(word.parameters.size())});
-      const auto values = parameters.begin() + nodes[n].first;
-      word.parameters.insert(word.parameters.end(), values, values + nodes[n].count);
-    }
-  }
-
-  // Drops what the word no longer holds.
   void compact() {
-    flatten();
-    nodes.clear(), active.clear();
-    parameters = word.parameters;
-    for (const Module& m : word.modules) {
-      const auto i = std::uint32_t(nodes.size());
-      nodes.push_back(
-          {m.symbol, m.count, m.first, i == 0 ? none : i - 1, i + 1 == word.modules.size() ? none : i + 1});
-      if (rewritten(m.symbol)) active.push_back(i);
-    }
+    const std::vector<Place> now = growing.compact();
+    for (Place& n : active) n = now[n];
+    answers.follow(now);
   }
 };
 
@@ -354,10 +296,10 @@ const Word& Deriver::derive(std::uint64_t seed, std::uint64_t index, std::option
   state_->begin(random, candidate);
   const int count = steps.value_or(state_->grammar.steps);
   for (int i = 0; i < count && !state_->active.empty(); ++i) {
-    if (state_->grammar.queries) state_->answer();
+    if (state_->grammar.queries) state_->answers.fill(state_->growing);
     state_->step(random);
   }
-  state_->flatten();
+  state_->growing.write(state_->word);
   return state_->word;
 }
 

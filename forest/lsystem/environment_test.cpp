@@ -77,8 +77,8 @@ TEST(Questions, WithoutAnEnvironmentEverythingIsFarAway) {
             (std::vector<double>{0, 0, 0, 0}));
 }
 
-// A branch with no answer that a production could look at is not walked over; that must change no answer.
-TEST(Questions, SilentBranchesAreSkippedAndNothingElse) {
+// Branches in which nothing grows are gone over once; places are counted from a soma in one of them all the same.
+TEST(Questions, TellTheSameBesideBranchesInWhichNothingGrows) {
   const Site site{&cortex_of_layers(), {0, 1000, 0}};
   for (const char* silent : {"", "[ +(90) F(30) [ F(5) ] F(5) ]", "[ F(3) ] [ [ F(2) ] ]",
                              "[ +(40) F(3) ?D(0) F(2) ]", "[ +(40) F(3) ?D(0) [ F(2) ] ]"})

@@ -16,115 +16,44 @@
 #include "forest/lsystem/drawing.h"
 #include "forest/lsystem/exclusion.h"
 #include "forest/lsystem/traced_branch.h"
+#include "forest/lsystem/wanderer.h"
 
 namespace forest::lsystem {
-namespace {
 
-constexpr std::uint32_t no_end = 0xffffffffu;
-
-struct State {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d frame;                           // columns: heading, left, up
-  Eigen::Vector3d step = Eigen::Vector3d::Zero();  // the direction of the last one
-  double diameter = 1., tropism = 0., outward = 0., flat = 0., seek = 0., shun = 0.;
-  double shun_reach = 0.;
-  double spines = 0.;                                  // per µm
-  double avoid = -1.;                                  // µm kept free; below 0: it goes through everything
-  Eigen::Vector3d towards = Eigen::Vector3d::UnitY();  // of tropism
-  Eigen::Vector3d across = Eigen::Vector3d::UnitZ();   // of flattening
-  Drawing::Node node = Drawing::none;                  // the drawn point the turtle stands on
-  Drawing::Node begun = Drawing::none;                 // … and that where the traced branch to it began
-  Drawing::Pen pen;
-};
+Stance::Stance() {
+  frame.col(0) = Eigen::Vector3d::UnitY();
+  frame.col(1) = -Eigen::Vector3d::UnitX();
+  frame.col(2) = Eigen::Vector3d::UnitZ();
+}
 
 class Turtle {
  public:
-  Turtle(const Word& word, const Grammar& grammar, const cortex::Site& site)
-      : word_(word),
+  enum class Purpose { drawing, answering };
+
+  Turtle(const Grammar& grammar, const cortex::Site& site, Purpose purpose)
+      : draws_(purpose == Purpose::drawing),
         grammar_(grammar),
         environment_(site.environment ? *site.environment : nothing()),
-        at_(site.at.cast<double>()) {
-    state_.frame.col(0) = Eigen::Vector3d::UnitY();
-    state_.frame.col(1) = -Eigen::Vector3d::UnitX();
-    state_.frame.col(2) = Eigen::Vector3d::UnitZ();
-  }
+        at_(site.at.cast<double>()) {}
 
-  Morphology draw(const Annotations& annotations) {
-    drawn_.reserve(word_.modules.size() / 2);
-    walk();
+  Morphology draw(const Word& word, const Annotations& annotations) {
+    drawn_.reserve(word.modules.size() / 2);
+    for (const Module& m : word.modules) act(m.symbol, word.of(m));
+    if (!stack_.empty()) fail("a branch is not closed");
     drawn_.even_out();
     return drawn_.build(soma_ ? std::optional(soma()) : std::nullopt, annotations);
   }
-  // Draws nothing, and writes its answers into the word.
-  void answer(std::vector<double>& parameters) {
-    answers_ = &parameters;
-    const std::vector<std::uint32_t> ends = ends_of_silent_branches();
-    for (std::uint32_t i = 0; i < ends.size(); ++i)
-      if (ends[i] != no_end)
-        i = ends[i];
-      else
-        act(word_.modules[i]);
-  }
 
- private:
-  void walk() {
-    for (const Module& m : word_.modules) act(m);
-    if (!stack_.empty()) fail("a branch is not closed");
-  }
+  const Stance& stance() const { return state_; }
+  void return_to(const Stance& stance) { state_ = stance; }
+  bool has_soma() const { return soma_.has_value(); }
 
-  // For every [ of a branch with no answer that a production could look at its ], else no_end; for all modules up to the last question.
-  // Contexts see what is on their own branch and on those before; into others they look only where they have brackets.
-  std::vector<std::uint32_t> ends_of_silent_branches() const {
-    struct Branch {
-      std::uint32_t begin = no_end;
-      bool asks = false, grows = false, stands = false;  // … the soma, from which places are counted
-    };
-    const bool looks_into = std::ranges::any_of(grammar_.productions, [](const Production& p) {
-      return std::ranges::any_of(p.right, [](const Shape& s) { return s.symbol == Symbol(Action::push); });
-    });
-    std::vector<std::uint32_t> ends;
-    std::vector<Branch> open(1);
-    std::size_t asked = 0;  // modules up to the last question
-    for (const Module& m : word_.modules) {
-      const auto i = std::uint32_t(ends.size());
-      ends.push_back(no_end);
-      if (!grammar_.productions_of[m.symbol].empty()) open.back().grows = true;
-      const Symbol s = grammar_.drawn_as[m.symbol];
-      if (s >= symbols_.size()) continue;
-      const Action action = symbols_[s].action;
-      if (action == Action::push) {
-        open.push_back({.begin = i});
-      } else if (action == Action::pop) {
-        if (open.size() == 1) fail("a ] closes nothing");
-        const Branch inner = open.back();
-        open.pop_back();
-        if (!inner.stands && !(inner.asks && (inner.grows || looks_into))) ends[inner.begin] = i;
-        Branch& outer = open.back();
-        outer.asks |= inner.asks, outer.grows |= inner.grows, outer.stands |= inner.stands;
-      } else if (action == Action::soma) {
-        open.back().stands = true;
-      } else if (is_question(action)) {
-        open.back().asks = true, asked = i + 1;
-      }
-    }
-    ends.resize(asked);
-    return ends;
-  }
-
-  static const cortex::Environment& nothing() {
-    static const cortex::Environment empty;
-    return empty;
-  }
-
-  [[noreturn]] void fail(std::string_view what) const {
-    throw Error(fmt::format("{}: {}; mend the grammar", grammar_.file, what));
-  }
-
-  void act(const Module& m) {
-    const Symbol drawn_as = grammar_.drawn_as[m.symbol];
+  // An answer is written where it is wanted, as much of it as there is room for.
+  void act(Symbol module, std::span<const double> values, std::span<double> wanted = {}) {
+    const Symbol drawn_as = grammar_.drawn_as[module];
     if (drawn_as >= symbols_.size()) return;
     const TurtleSymbol& symbol = symbols_[drawn_as];
-    const std::span<const double> values = word_.of(m);
+    if (is_question(symbol.action) && wanted.empty()) return;
     const auto parameter = [&](std::size_t i, double otherwise) {
       if (i >= values.size()) return otherwise;
       if (!std::isfinite(values[i]))
@@ -201,7 +130,7 @@ class Turtle {
       case Action::head:
         return head(direction(parameter(0, 0.), parameter(1, 0.), parameter(2, 0.)));
       case Action::trace:
-        return trace(m);
+        return trace(values);
       case Action::gauge:
         state_.pen.gauge = gauge(parameter(0, 0.), parameter(1, 0.), parameter(2, 0.));
         return;
@@ -218,25 +147,35 @@ class Turtle {
         state_.shun_reach = std::max(1e-6, usual(1));
         return;
       case Action::ask_place:
-        return tell(m, Eigen::Vector3d(state_.position - soma_place_));
+        return tell(wanted, Eigen::Vector3d(state_.position - soma_place_));
       case Action::ask_heading:
-        return tell(m, Eigen::Vector3d(state_.frame.col(0)));
+        return tell(wanted, Eigen::Vector3d(state_.frame.col(0)));
       case Action::ask_step:
-        return tell(m, state_.step);
+        return tell(wanted, state_.step);
       case Action::ask_depth: {
         const auto stratum = environment_.stratum(here());
-        return tell(m,
+        return tell(wanted,
                     Eigen::Vector4d(environment_.depth(here()), stratum.layer, stratum.above, stratum.below));
       }
       case Action::ask_near: {
         const auto nearest = environment_.nearest_soma(here(), at_);
-        return tell(m, with_direction(nearest.distance, nearest.direction));
+        return tell(wanted, with_direction(nearest.distance, nearest.direction));
       }
       case Action::ask_attraction: {
         const auto field = environment_.field(here());
-        return tell(m, with_direction(field.density, field.direction));
+        return tell(wanted, with_direction(field.density, field.direction));
       }
     }
+  }
+
+ private:
+  static const cortex::Environment& nothing() {
+    static const cortex::Environment empty;
+    return empty;
+  }
+
+  [[noreturn]] void fail(std::string_view what) const {
+    throw Error(fmt::format("{}: {}; mend the grammar", grammar_.file, what));
   }
 
   static Eigen::Vector3d direction(double x, double y, double z) {
@@ -328,7 +267,7 @@ class Turtle {
     const Eigen::Vector3d from = std::exchange(state_.position, place);
     must_be_in_world(place);
     must_be_size(state_.diameter);
-    if (answers_) return;
+    if (!draws_) return;
     if (state_.spines > 0.) bear(state_.spines * (place - from).norm());
     if (state_.node == Drawing::none) state_.node = drawn_.begin(from, start_radius, state_.pen);
     state_.node = drawn_.line(state_.node, place, start_radius, float(0.5 * state_.diameter), state_.pen);
@@ -359,15 +298,15 @@ class Turtle {
     return drawn_.add_gauge(stops, std::clamp(even, 0., 1.));
   }
 
-  void trace(const Module& m) {
-    const Tracing told = Tracing::told(word_.of(m));
+  void trace(std::span<const double> values) {
+    const Tracing told = Tracing::told(values);
     if (!(told.mirror >= 0. && told.mirror <= 3. && told.mirror == std::floor(told.mirror)))
       fail(fmt::format("Trace has mirror {:g}, which is 0, 1, 2 or 3", told.mirror));
     const lsystem::Trace &way = branch(told.sample, told.row, told.branch),
                          &calibre = branch(told.sample, told.like < 0. ? told.row : told.like, told.branch);
     TracedBranch traced(told, way, calibre, drawn_.gauge(state_.pen.gauge), state_.position,
                         state_.frame.col(0));
-    if (answers_ && state_.avoid < 0.)
+    if (!draws_ && state_.avoid < 0.)
       line_to(traced.end(), 0.f);
     else
       follow(traced);
@@ -410,8 +349,8 @@ class Turtle {
   }
 
   template <class Vector>
-  void tell(const Module& m, const Vector& answer) {  // as much of it as is asked
-    if (answers_) std::copy_n(answer.data(), std::size_t(m.count), answers_->begin() + m.first);
+  static void tell(std::span<double> wanted, const Vector& answer) {
+    std::copy_n(answer.data(), wanted.size(), wanted.begin());
   }
   static Eigen::Vector4d with_direction(double number, const Eigen::Vector3d& direction) {
     return {number, direction.x(), direction.y(), direction.z()};
@@ -424,7 +363,7 @@ class Turtle {
     constexpr double most = 100.;  // per µm: hundreds of times what any dendrite bears
     if (density > most) fail(fmt::format("Spiny({:g}) asks for more than {:g} spines per µm", density, most));
     state_.pen.spines = 0, state_.spines = density;
-    if (density == 0. || answers_) return;
+    if (density == 0. || !draws_) return;
     state_.pen.spines = drawn_.add_spines(Spines(told));
   }
   void bear(double spines) {
@@ -436,7 +375,7 @@ class Turtle {
   // A root of one point. Somata are kept together by their soma; this keeps together what has none.
   void begin(double diameter) {
     state_.diameter = std::max(0., diameter);
-    if (answers_) return;
+    if (!draws_) return;
     state_.node = drawn_.begin(state_.position, float(0.5 * state_.diameter), state_.pen);
   }
 
@@ -486,12 +425,11 @@ class Turtle {
   }
 
   const std::span<const TurtleSymbol> symbols_ = turtle_symbols();
-  const Word& word_;
+  const bool draws_;
   const Grammar& grammar_;
-  State state_;
-  std::vector<State> stack_;
+  Stance state_;
+  std::vector<Stance> stack_;
   Drawing drawn_;
-  std::vector<double>* answers_ = nullptr;  // then nothing is drawn
   std::optional<Point> soma_;
   std::array<double, 4> outline_{};
   double soma_reach_ = 0.;  // from its middle, of the place of its outline that is farthest at most
@@ -502,11 +440,19 @@ class Turtle {
   Obstacles obstacles_;
 };
 
-}  // namespace
+Wanderer::Wanderer(const Grammar& grammar, const cortex::Site& site)
+    : turtle_(std::make_unique<Turtle>(grammar, site, Turtle::Purpose::answering)) {}
+Wanderer::~Wanderer() = default;
+const Stance& Wanderer::stance() const { return turtle_->stance(); }
+void Wanderer::return_to(const Stance& stance) { turtle_->return_to(stance); }
+bool Wanderer::has_soma() const { return turtle_->has_soma(); }
+void Wanderer::act(Symbol symbol, std::span<double> parameters) {
+  turtle_->act(symbol, parameters, parameters);
+}
 
 Morphology interpret(const Word& word, const Grammar& grammar, const Annotations& annotations,
                      const cortex::Site& site) {
-  return Turtle(word, grammar, site).draw(annotations);
+  return Turtle(grammar, site, Turtle::Purpose::drawing).draw(word, annotations);
 }
 
 bool heeds_surroundings(const Grammar& grammar) {
@@ -516,10 +462,6 @@ bool heeds_surroundings(const Grammar& grammar) {
   return grammar.queries || std::ranges::any_of(grammar.axiom, heeds) ||
          std::ranges::any_of(grammar.productions,
                              [&](const Production& p) { return std::ranges::any_of(p.successor, heeds); });
-}
-
-void answer(Word& word, const Grammar& grammar, const cortex::Site& site) {
-  Turtle(word, grammar, site).answer(word.parameters);
 }
 
 }  // namespace forest::lsystem

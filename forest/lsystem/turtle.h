@@ -39,9 +39,6 @@ std::span<const TurtleSymbol> turtle_symbols();
 Morphology interpret(const Word& word, const Grammar& grammar, const Annotations& annotations = {},
                      const cortex::Site& site = {});
 
-/// Writes into the word's modules ?P, ?H and their like where the turtle is when it comes to them and what is there
-/// (Prusinkiewicz, James & Měch 1994, "Synthetic topiary"). Throws as interpret() does.
-void answer(Word& word, const Grammar& grammar, const cortex::Site& site = {});
 constexpr bool is_question(Action action) { return action >= Action::ask_place; }
 
 /// Whether what lies around can change what grows: the grammar avoids, seeks or shuns, or asks.
