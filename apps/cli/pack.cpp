@@ -53,14 +53,16 @@ std::string sets_of(const std::filesystem::path& file, Console& console) {
 // Packs the synapses of a circuit beside its forest file; returns how many. Without any there is no file.
 std::size_t pack_synapses(const std::filesystem::path& circuit, const io::SonataOutline& outline,
                           const std::filesystem::path& out, std::vector<io::Warning>& warnings,
-                          Progress& progress) {
+                          Console& console) {
   io::SonataEdges edges = io::read_edges(circuit, outline.circuit, outline.nodes);
   std::ranges::move(edges.warnings, std::back_inserter(warnings));
+  for (const std::string& sentence : edges.damaged)
+    console.warn(sentence + ", --no-synapses leaves all out without this");
   std::size_t count = 0;
   for (const auto& projection : edges.projections) count += projection.synapses.size();
   if (count)
     write_file(scene::Synapses::beside(out),
-               scene::Synapses::make(scene::Forest::open(out), edges.projections, progress));
+               scene::Synapses::make(scene::Forest::open(out), edges.projections, console.progress()));
   return count;
 }
 
@@ -105,8 +107,7 @@ std::function<void()> pack(CLI::App& command, Console& console) {
     const double seconds = seconds_since(begin);
     std::size_t synapses = 0;
     if (!options->no_synapses) try {
-        synapses =
-            pack_synapses(options->circuit, outline, options->out, outline.warnings, console.progress());
+        synapses = pack_synapses(options->circuit, outline, options->out, outline.warnings, console);
       } catch (const Error& e) {  // the forest is whole without them
         console.warn(fmt::format("{}; the forest has no synapses, --no-synapses leaves them out without this",
                                  e.what()));

@@ -141,7 +141,7 @@ class Reader {
     const Json* edges = SonataConfig::find(*networks, "edges");
     if (edges && !edges->is_array()) config_.refuse("\"edges\" must be a list of files");
     if (edges)
-      for (const Json& entry : *edges) add_file(entry);
+      for (const Json& entry : *edges) but_for_damage([&] { add_file(entry); });
     return std::move(result_);
   }
 
@@ -150,13 +150,22 @@ class Reader {
     result_.warnings.push_back({0, code, std::move(sentence)});
   }
 
+  void but_for_damage(const auto& read) {
+    try {
+      read();
+    } catch (const Error& error) {
+      result_.damaged.push_back(fmt::format("{}; these synapses were left out", error.what()));
+    }
+  }
+
   void add_file(const Json& entry) {
     const auto path = config_.path(entry, "edges_file");
     if (!path) config_.refuse("an entry of \"edges\" has no \"edges_file\"; add it");
     const hdf5::File file(*path);
     const Json* populations = SonataConfig::find(entry, "populations");
     if (!populations || !populations->is_object()) {
-      for (const std::string& name : file.members("/edges")) add_population(file, name);
+      for (const std::string& name : file.members("/edges"))
+        but_for_damage([&] { add_population(file, name); });
       return;
     }
     for (const auto& [name, description] : populations->items()) {
@@ -165,7 +174,7 @@ class Reader {
         warn("not-synapses",
              fmt::format("edges {} are {}, no synapses; they were left out", name, type->dump()));
       else
-        add_population(file, name);
+        but_for_damage([&] { add_population(file, name); });
     }
   }
 

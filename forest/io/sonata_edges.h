@@ -16,6 +16,8 @@ namespace forest::io {
 struct SonataEdges {
   std::vector<circuit::Projection> projections;
   std::vector<Warning> warnings;  // what was left out
+  std::vector<std::string>
+      damaged;  // what could not be read, a sentence for each file or population of edges
 };
 
 /// Reads the synapses of a circuit: of every chemical population of edges those whose targets are planted and that say where
@@ -23,7 +25,7 @@ struct SonataEdges {
 /// Their sign is that of their source's type, of virtual sources too, or else told by syn_type_id: 100 and more excite.
 /// @param place  of the circuit, as read_sonata takes it
 /// @param circuit, nodes  of io::outline_sonata: the types of instances, and what SONATA calls each
-/// Throws InputError (file, sentence that names the array).
+/// Throws InputError (file, sentence) when the configuration has no list of edges; what is damaged costs its own synapses alone.
 SonataEdges read_edges(const std::filesystem::path& place, const circuit::Circuit& circuit,
                        const reports::Nodes& nodes);
 

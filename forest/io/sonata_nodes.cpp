@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/io/sonata_nodes.h"
 
+#include <algorithm>
 #include <limits>
 #include <set>
 #include <unordered_map>
@@ -115,6 +116,11 @@ std::vector<std::uint64_t> NodePopulation::ids() const {
       file_.refuse(fmt::format("{}/node_id holds {}, below zero; the file is damaged", path_, own[i]));
     ids[i] = told ? std::uint64_t(own[i]) : i;
   }
+  std::vector<std::uint64_t> sorted = ids;
+  std::ranges::sort(sorted);
+  if (const auto twice = std::ranges::adjacent_find(sorted); twice != sorted.end())
+    file_.refuse(
+        fmt::format("{}/node_id holds {} twice; give every node a number of its own", path_, *twice));
   return ids;
 }
 
