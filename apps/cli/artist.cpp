@@ -227,11 +227,12 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
     frame::Image image = artist.draw(view, plan.width, plan.height).image;
     if (!artist.look_at(view, plan.marks, image, places)) break;
   }
+  std::string missing;
   for (int i = 0; i < count; ++i) {
     const scene::View view = view_at(i);
     Drawn drawn = artist.draw(view, plan.width, plan.height, {.outline = plan.outline});
     segments += drawn.segments;
-    artist.explain(view, plan.marks, drawn.image, places);
+    missing = artist.explain(view, plan.marks, drawn.image, places);
     reel.add(drawn.image);
   }
   if (segments && reel.covered() == 0.)
@@ -241,6 +242,7 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
                     segments, artist.renderer()));
   FilmFigures figures = reel.finish();
   figures.renderer = artist.renderer();
+  figures.missing = std::move(missing);
   return figures;
 }
 

@@ -135,6 +135,7 @@ struct FilmFigures {
   double seconds = 0.;  // drawing and encoding
   double covered = 0.;  // mean share of pixels
   std::string codec, renderer;
+  std::string missing;  // what was asked for and is not in its pictures, a sentence; or nothing
 };
 
 struct FilmPlan {

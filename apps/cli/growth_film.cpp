@@ -128,14 +128,16 @@ FilmFigures film_growth(std::span<const std::filesystem::path> folders, const Fi
   const frame::Viewport picture{float(plan.width), float(plan.height)};
   const scene::Paper paper = scene::paper_of(view.background);
   scene::Arrangement places;  // beside what they became
-  const auto draw = [&](const scene::Forest& grown, auto explain) {
+  std::string missing;
+  const auto draw = [&](const scene::Forest& grown, const auto& explain) {
     Artist artist(grown, drawer);
     renderer = artist.renderer();
     image = artist.draw(view, plan.width, plan.height).image;
     if (marks.names) scene::paint_names(image, forest, view);  // where they stay
-    (artist.*explain)(view, marks, image, places);
+    explain(artist);
   };
-  draw(forest, &Artist::look_at);
+  const auto say = [&](Artist& artist) { missing = artist.explain(view, marks, image, places); };
+  draw(forest, [&](Artist& artist) { artist.look_at(view, marks, image, places); });
   const scene::Block last_step = block_of(steps.back(), picture, view.background);
   places.look_at(image, paper, {&last_step, 1});
   for (int i = 0; i < reel.count(); ++i) {
@@ -144,7 +146,7 @@ FilmFigures film_growth(std::span<const std::filesystem::path> folders, const Fi
     const bool last = time >= 1.f;
     const std::size_t wanted = last ? steps.size() : now;
     if (drawn != wanted) {
-      draw(last ? forest : scene::hung(at_step(growth, steps[now]), names, somata), &Artist::explain);
+      draw(last ? forest : scene::hung(at_step(growth, steps[now]), names, somata), say);
       const scene::Block step = block_of(steps[now], picture, view.background);
       places.paint(image, paper, {&step, 1});
       drawn = wanted;
@@ -153,6 +155,7 @@ FilmFigures film_growth(std::span<const std::filesystem::path> folders, const Fi
   }
   FilmFigures figures = reel.finish();
   figures.renderer = std::move(renderer);
+  figures.missing = std::move(missing);
   return figures;
 }
 

@@ -299,6 +299,7 @@ std::function<void()> movie(CLI::App& command, Console& console) {
       if (figures.covered == 0.)
         console.warn(
             "the film shows nothing: no neuron that is visible lies in its views; give others by --view");
+      if (!figures.missing.empty()) console.warn(figures.missing);
       console.print({{"file", options->out.string()},
                      {"pictures", figures.pictures},
                      {"frames_per_second", figures.pictures / figures.seconds},
