@@ -81,7 +81,7 @@ std::vector<Case> cases() {
       {"somata are kept out of",
        "axiom: Soma(12) f(7) Avoid(1) Shun(0.2, 8) Seek(0.1) A ?N(0)\np: A > ?N(d) -> +(90 / d) F(6, 1) A\n",
        30}};
-  for (const char* name : {"tufted", "martinotti", "astrocyte"}) {
+  for (const char* name : {"tufted", "martinotti", "stellate", "astrocyte"}) {
     const Grammar g = parse_file(std::string(FOREST_SOURCE_DIR) + "/data/grammars/" + name + ".lsys");
     all.push_back({name, g.text, g.steps});
   }

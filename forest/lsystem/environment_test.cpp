@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <set>
 #include <string>
 
@@ -235,6 +236,48 @@ TEST(Tufted, IsTheSameAtAnyNumberOfThreads) {
   EXPECT_EQ(many, grow_population(g, 8, 3, Progress::none(), 0, site));
   EXPECT_EQ(many[5], grow(g, 3, 5, site));
   EXPECT_NE(many[5], grow(g, 3, 5));
+}
+
+// The length of one kind by layer, as shares.
+std::map<int, double> by_layer(const std::vector<Morphology>& cells, SectionKind kind, const Site& site) {
+  std::map<int, double> lengths;
+  double all = 0.;
+  for (const Morphology& m : cells)
+    for (std::size_t s = 0; s < m.sections().size(); ++s) {
+      if (m.sections()[s].kind != kind) continue;
+      const auto points = m.points(SectionId(s));
+      for (std::size_t i = 1; i < points.size(); ++i) {
+        const Vec3 middle = .5f * (points[i - 1].position() + points[i].position()) + site.at;
+        const double length = segment_length(points[i - 1], points[i]);
+        lengths[site.environment->stratum(middle.cast<double>()).layer] += length;
+        all += length;
+      }
+    }
+  for (auto& [layer, length] : lengths) length /= all;
+  return lengths;
+}
+
+TEST(Stellate, DendritesStayInLayerFourAndTheAxonClimbs) {
+  const Grammar g = shipped("stellate");
+  const Site site{&cortex_of_layers(), {0, 1425, 0}};
+  const auto cells = grow_population(g, 60, 5, Progress::none(), 0, site);
+  auto dendrites = by_layer(cells, SectionKind::basal, site), axon = by_layer(cells, SectionKind::axon, site);
+  EXPECT_GT(dendrites[4], .95);
+  EXPECT_GT(axon[4] + axon[2], .7);
+  EXPECT_GT(axon[2], axon[5] + axon[6]);
+  for (const Morphology& m : cells) {
+    const auto stems = std::ranges::count_if(
+        m.roots(), [&](SectionId root) { return m.section(root).kind == SectionKind::basal; });
+    EXPECT_GE(stems, 4);
+    EXPECT_LE(stems, 6);
+  }
+}
+
+TEST(Stellate, GrowsWithoutAnEnvironmentToo) {
+  for (const Morphology& m : grow_population(shipped("stellate"), 20, 3)) {
+    EXPECT_LT(m.segment_count(), 6000u);
+    for (const Finding& f : validate(m)) EXPECT_NE(f.severity, Severity::warning) << f.sentence;
+  }
 }
 
 // Dendrites sprout and elongate; then all but one are taken back from their tips, step by step.

@@ -7,7 +7,7 @@ python3 - <<'PY'
 import json
 out = json.load(open("out.json"))
 assert out["neurons_per_second"] > 0 and out["segments_per_second"] > out["neurons_per_second"], out
-assert set(out["growing"]) == {"astrocyte", "basket", "bes", "martinotti", "microglia", "motoneuron", "purkinje", "pyramidal", "retraction", "tufted"}, out
+assert set(out["growing"]) == {"astrocyte", "basket", "bes", "martinotti", "microglia", "motoneuron", "purkinje", "pyramidal", "retraction", "stellate", "tufted"}, out
 for result in out["growing"].values():
     assert result["neurons"] >= 200 and result["segments_each"] > 300, out
     assert result["neurons_per_second_into_a_file"] > 0 and result["bytes_each_in_the_file"] > 1000, out
