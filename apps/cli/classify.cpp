@@ -87,6 +87,7 @@ std::string sentence(const Types& t, const Given& given, const Options& options)
         : d.silhouette >= .25 ? "apart, with cells between them"
                               : "hardly apart",
         d.silhouette, d.stability);
+  if (d.types > 1 && !options.types && d.types == t.divisions.size()) out += " More were not tried.";
   if (!given.type.empty())
     out += fmt::format(" They agree with the {} given types to an adjusted Rand index of {:.2f}.",
                        given.names.size(), adjusted_rand(d.type, given.type));
@@ -231,6 +232,7 @@ void run(const Options& options, Console& console) {
   const Sample sample = options.repo.empty() ? read_sample(options.files, {}, console)
                                              : read_sample({options.population}, options.repo, console);
   must_have_sections(sample, options.kind);
+  warn_of_copies(sample, console);
   const FeatureTable table = measured(sample, groups_of(options.kind), console);
   const Types t =
       find_types(table,
@@ -270,7 +272,7 @@ std::function<void()> classify(CLI::App& command, Console& console) {
                           ->type_name("REPO");
   command.add_option("--population", options->population, "Only those of this population")->needs(repo);
   add_kind(command, options->kind);
-  must_be_whole(*command.add_option("--types", options->types, "How many types; found when not said"), 1, 20);
+  must_be_whole(*command.add_option("--types", options->types, "How many types; found when not said"), 1, 40);
   command.add_option("--csv", options->csv, "Write the type of each neuron to this file")->type_name("FILE");
   add_report(command, options->report);
   add_seed(command, options->seed, "The same seed gives the same types");

@@ -250,6 +250,7 @@ void run(const Options& options, Console& console) {
       compare(tables[0], tables[1],
               {.repeats = options.repeats, .permutations = options.permutations, .seed = options.seed},
               console.progress());
+  for (const Sample& sample : samples) warn_of_copies(sample, console);
   warn_of_shared(samples[0], samples[1], console);
   console.print(json_of(c, names, options));
   console.say(sentence(c, names[0], names[1]));

@@ -122,11 +122,11 @@ Json json_of(const SegmentFamilies& f) {
   for (const auto& table : f.tables) {
     Json& bins = tables[std::string(name_of(table.given))] = Json::array();
     for (const ChanceBin& b : table.bins)
-      bins.push_back({{"upper", number(b.upper)},
+      bins.push_back({{"up_to", number(b.upper)},
                       {"count", b.count},
                       {"chance", number(b.chance.value)},
                       {"lower", number(b.chance.lower)},
-                      {"upper_limit", number(b.chance.upper)}});
+                      {"upper", number(b.chance.upper)}});
   }
   for (const FittedQuantity& q : f.quantities) {
     Json entry{{"name", q.name},
@@ -137,7 +137,7 @@ Json json_of(const SegmentFamilies& f) {
     entry["text"] = q.distribution;
     Json& bins = entry["bins"] = Json::array();
     for (const auto& b : q.bins) {
-      bins.push_back({{"upper", number(b.upper)}});
+      bins.push_back({{"up_to", number(b.upper)}});
       bins.back().update(json_of(b.fit));
     }
     quantities.push_back(std::move(entry));
@@ -160,6 +160,7 @@ std::string note_of(const DistributionFit& f) {
 
 std::string report_of(const SegmentFamilies& f, const SegmentValues& seen, const Sample& sample,
                       const Options& options) {
+  const Given by = *given_of(options.by);
   Report report("Distributions of " + sample.name,
                 fmt::format("The {} of {} (kind {}) fork with a chance of {}; the others end.",
                             counted(f.sections, "segment"), counted(f.cells, "cell"), options.kind,
@@ -182,7 +183,7 @@ std::string report_of(const SegmentFamilies& f, const SegmentValues& seen, const
   }
   for (const auto family : {Quantity::trajectory, Quantity::rotations, Quantity::calibre}) {
     std::vector<DensityPanel> panels;
-    std::vector<std::vector<std::string>> parameters, candidates;
+    std::vector<std::vector<std::string>> parameters, candidates, binned;
     for (std::size_t i = 0; i < f.quantities.size(); ++i) {
       const FittedQuantity& q = f.quantities[i];
       if (q.family != family || q.fit.count == 0) continue;
@@ -199,6 +200,10 @@ std::string report_of(const SegmentFamilies& f, const SegmentValues& seen, const
       for (const ParameterEstimate& e : q.fit.estimates)
         parameters.push_back({first ? std::string(q.name) : "", std::exchange(first, false) ? q.fit.name : "",
                               e.name, readable(e.value), readable(e.lower), readable(e.upper)});
+      for (const auto& bin : q.bins)
+        binned.push_back({&bin == &q.bins.front() ? std::string(q.name) : "", readable(bin.upper),
+                          std::to_string(bin.fit.count), bin.fit.name, readable(bin.fit.kolmogorov),
+                          readable(bin.fit.p), estimates_of(bin.fit)});
       for (const auto& c : q.fit.candidates)
         candidates.push_back({&c == &q.fit.candidates.front() ? std::string(q.name) : "", c.name,
                               std::to_string(c.parameters), readable(c.log_likelihood), readable(c.aicc),
@@ -213,6 +218,10 @@ std::string report_of(const SegmentFamilies& f, const SegmentValues& seen, const
                 "that come back "
                 "exactly, with their share. The outermost 1 % may lie outside.");
     report.table({"quantity", "family", "parameter", "value", "from", "to"}, parameters);
+    if (!binned.empty()) {
+      report.text(fmt::format("By {}:", name_of(by)));
+      report.table({"quantity", "up to", "values", "family", "distance", "p", "parameters"}, binned);
+    }
     report.text("All families that could be fitted, the chosen one first:");
     report.table({"quantity", "family", "parameters", "log likelihood", "AICc", "BIC", "chosen"}, candidates);
   }
@@ -232,6 +241,7 @@ void run(const Options& options, Console& console) {
   const Given by = *given_of(options.by);
   const Sample sample = options.repo.empty() ? read_sample(options.files, "", console)
                                              : read_sample({options.population}, options.repo, console);
+  warn_of_copies(sample, console);
   const std::vector<Morphology>& cells = sample.neurons;
   const SegmentFamilies families =
       segment_families(cells,

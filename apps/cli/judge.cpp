@@ -336,6 +336,7 @@ void leave_out(const Options& options, Console& console) {
                      .report = options.report,
                      .force = options.force};
   must_have_sections(trial.traced, options.kind);
+  warn_of_copies(trial.traced, console);
   std::optional<lsystem::Grammar> model;
   std::optional<Sample> grown;
   if (!options.model.empty()) trial.model = &model.emplace(model_of(options));
@@ -384,6 +385,7 @@ void run(const Options& options, Console& console) {
       judge_samples(train, held_out, grown, parametric, options.kind,
                     {.repeats = options.repeats, .seed = options.seed, .longest_run = longest_run}, console,
                     options.slices);
+  for (const Sample* sample : {&train, &held_out}) warn_of_copies(*sample, console);
   warn_of_shared(train, held_out, console);
   const auto known = model ? known_to(*model, held_out) : std::vector<std::string>();
   warn_of_known(known, held_out, console);

@@ -179,6 +179,7 @@ void run(const Options& options, Console& console) {
   const Sample cells = cells_of(options, console),
                population = read_sample(options.population, options.repo, console);
   for (const Sample* sample : {&cells, &population}) must_have_sections(*sample, options.kind);
+  warn_of_copies(population, console);
   const std::vector<Group> groups = groups_of(options.kind);
   const FeatureTable known = measured(population, groups, console), asked = measured(cells, groups, console);
   std::vector<Typicality> answers;

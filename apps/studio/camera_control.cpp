@@ -82,6 +82,13 @@ frame::Camera dolly(const frame::Camera& camera, const frame::Viewport& viewport
   return moved;
 }
 
+frame::Camera focused(frame::Camera camera, float depth) {
+  if (camera.orthographic() || !(depth > 0.f)) return camera;
+  Bearing b = bearing(camera);
+  b.distance = depth;
+  return looking(camera, b);
+}
+
 frame::Camera fly(const frame::Camera& camera, const Vec3& way) {
   const Vec3 step = camera.axes() * Vec3(way.x(), way.y(), -way.z());
   frame::Camera moved = camera;

@@ -37,6 +37,9 @@ frame::Camera pan(const frame::Camera& camera, const frame::Viewport& viewport, 
 /// there. At the shortest distance the target moves on ahead, so that one never gets stuck.
 frame::Camera dolly(const frame::Camera& camera, const frame::Viewport& viewport, const Vec2& pixel,
                     float factor);
+/// The same picture with its target straight ahead at `depth`, where something is: what follows orbits and approaches that.
+/// Of parallel rays the target gives the size of all, and stays.
+frame::Camera focused(frame::Camera camera, float depth);
 /// Eye and target move by `way` µm to the right, up and forward as the eye sees them.
 frame::Camera fly(const frame::Camera& camera, const Vec3& way);
 /// The same direction of view, from where the sphere fills the height of the picture.

@@ -112,6 +112,37 @@ LAW(DollyNeverGetsStuck) {
   RC_ASSERT((next.target - next.eye).norm() > .9f * shortest);
 }
 
+LAW(StepsTowardsAThingShrinkAndItStaysUnderTheMouse) {
+  Random random(seed);
+  frame::Camera camera = any_camera(random);
+  const Vec2 pixel = any_pixel(random);
+  const Vec3 forward = (camera.target - camera.eye).normalized();
+  const Ray ray = ray_through(camera, viewport, pixel);
+  const float depth = any(random, 5., 4000.);  // nearer than the target, or beyond
+  const Vec3 thing = camera.eye + ray.direction * (depth / ray.direction.dot(forward));
+  const float far = (thing - camera.eye).norm();
+  float way = INFINITY;
+  for (int i = 1; i <= 8; ++i) {
+    const frame::Camera next =
+        dolly(focused(camera, (thing - camera.eye).dot(forward)), viewport, pixel, .85f);
+    const float step = (next.eye - camera.eye).norm();
+    RC_ASSERT(step < way);
+    way = step, camera = next;
+    RC_ASSERT((seen_at(camera, thing) - pixel).norm() < 1.f);
+  }
+  RC_ASSERT(std::abs((thing - camera.eye).norm() / (std::pow(.85f, 8.f) * far) - 1.f) < .02f);
+}
+
+LAW(FocusingMovesNothingInThePicture) {
+  Random random(seed);
+  frame::Camera camera = any_camera(random);
+  const frame::Camera moved = focused(camera, any(random, 1., 3000.));
+  RC_ASSERT(moved.eye == camera.eye);
+  RC_ASSERT((moved.axes() - camera.axes()).norm() < 1e-3f);
+  camera.projection = frame::Projection::orthographic;
+  RC_ASSERT(focused(camera, 10.f).target == camera.target);
+}
+
 LAW(FlyingIsTheSameInOneStepOrTwo) {
   Random random(seed);
   const frame::Camera camera = any_camera(random);

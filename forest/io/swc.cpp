@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <ranges>
 #include <utility>
 
 #include <fmt/format.h>
@@ -35,9 +36,12 @@ constexpr std::array<Oddity, static_cast<std::size_t>(SwcOddity::count)> table{{
     {"extra-columns", false, "all but the first seven are skipped", {}, true},
     {"decimal-integer", false, "read as the whole number it is"},
     {"exponent", false, "read as the number it is"},
-    {"unknown-radius", true, "read as the radius of the parent point, 0 without one",
+    {"unknown-radius", true,
+     "read as the radius of the parent point, at the beginning of a neurite of the next that has one",
      "measure it where thickness matters"},
-    {"negative-radius", true, "read as unknown, so as the radius of the parent point, 0 without one",
+    {"negative-radius", true,
+     "read as unknown, so as the radius of the parent point, at the beginning of a neurite of the next that "
+     "has one",
      "measure it where thickness matters"},
     {"zero-radius", true, "kept as 0", "give the measured one"},
     {"unknown-place", true, "read as that of the parent point",
@@ -516,7 +520,25 @@ class Assembler {
     return starts;
   }
 
+  // At the beginning of a neurite a thickness is that of the next point that has one: the soma's is no neurite's.
+  void fill_unknown_beginnings() {
+    std::vector<float> below(rows_.size(), NAN);  // of this point, or one that follows
+    const auto visit = [&](std::int32_t row) {
+      float& own = below[std::size_t(row)];
+      if (!std::isnan(radius(row))) own = radius(row);
+      const std::int32_t parent = parents_[std::size_t(row)];
+      const bool begins = !is_soma(row) && (parent == none || is_soma(parent));
+      if (begins && std::isnan(radius(row)))
+        rows_.points[std::size_t(row)].radius = std::isnan(own) ? 0.f : own;
+      if (parent != none && !std::isnan(own)) below[std::size_t(parent)] = own;
+    };
+    std::vector<std::int32_t> order;
+    parents_first([&](std::int32_t row) { order.push_back(row); });
+    for (const std::int32_t row : order | std::views::reverse) visit(row);
+  }
+
   void fill_unknown_numbers() {
+    fill_unknown_beginnings();
     parents_first([&](std::int32_t row) {
       Point& point = rows_.points[std::size_t(row)];
       const std::int32_t parent = parents_[std::size_t(row)];

@@ -114,6 +114,12 @@ const std::vector<Dialect>& dialects() {
          EXPECT_EQ(m.points(SectionId(0))[1].radius, 2.f);
          EXPECT_EQ(m.points(SectionId(1))[1].radius, 2.f);
        }},
+      {"unknown-radius", 2,
+       "1 1 0 0 0 5 -1\n2 3 0 5 0 NaN 1\n3 3 0 15 0 NaN 2\n4 3 3 19 0 NA 3\n5 3 -3 19 0 1 3\n",
+       [](const Morphology& m) {  // not the soma's 5
+         is_the_cell(m);
+         for (const Point& p : m.points()) EXPECT_EQ(p.radius, 1.f);
+       }},
       {"negative-radius", 3,
        "1 1 0 0 0 5 -1\n2 3 0 5 0 2 1\n3 3 0 15 0 -1 2\n4 3 3 19 0 1 3\n5 3 -3 19 0 1 3\n",
        [](const Morphology& m) {

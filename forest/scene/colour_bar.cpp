@@ -59,6 +59,17 @@ std::pair<std::string, std::string> ColourBar::ends() const {
   }
 }
 
+std::vector<ColourBar::Tick> ColourBar::between() const {
+  std::vector<Tick> all;
+  const auto tell = [&](float value) {
+    all.push_back({(value - low) / (high - low), fmt::format("{:g}", value)});
+  };
+  if (threshold) return tell(*threshold), all;
+  for (const double value : ticks(double(low), double(high), 4))
+    if (!whole || value == std::round(value)) tell(float(value));
+  return all;
+}
+
 std::optional<ColourBar> bar_of(const Colouring& colouring, Background background) {
   if (!colouring.gauge) return std::nullopt;
   const Gauge& gauge = *colouring.gauge;
@@ -122,20 +133,15 @@ void paint(frame::Image& image, const ColourBar& bar, const Box& place, const Le
   const auto [low, high] = bar.ends();
   letters.write(image, low, place.left, base);
   letters.write(image, high, place.right - letters.width(high), base);
-  // Between them the threshold, or round values, where there is room.
   const float apart = 1.3f * letters.height, end = place.right - letters.width(high) - apart;
   float begin = place.left + letters.width(low) + apart;
-  const auto write = [&](float value) {
-    const std::string text = fmt::format("{:g}", value);
-    const float at = place.left + (value - bar.low) / (bar.high - bar.low) * (place.right - place.left),
-                half = .5f * letters.width(text);
-    if (at - half < begin || at + half > end) return;
-    letters.write(image, text, at - half, base);
+  for (const ColourBar::Tick& tick : bar.between()) {
+    const float at = place.left + tick.at * (place.right - place.left),
+                half = .5f * letters.width(tick.label);
+    if (at - half < begin || at + half > end) continue;
+    letters.write(image, tick.label, at - half, base);
     begin = at + half + apart;
-  };
-  if (bar.threshold) return write(*bar.threshold);
-  for (const double value : ticks(double(bar.low), double(bar.high), 4))
-    if (!bar.whole || value == std::round(value)) write(float(value));
+  }
 }
 
 std::optional<Block> block_of(std::span<const ColourBar> bars, const frame::Viewport& picture,

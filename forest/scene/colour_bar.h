@@ -31,6 +31,12 @@ struct ColourBar {
   Vec3 at(float t) const;  // the colour at a share 0–1 of its length, sRGB 0–1
   /// What stands at its ends, with as many digits as tell them apart, four or more.
   std::pair<std::string, std::string> ends() const;
+  struct Tick {
+    float at;  // share 0–1 of its length
+    std::string label;
+  };
+  /// What is told between its ends where there is room: the threshold alone, or else round values.
+  std::vector<Tick> between() const;
 };
 
 /// Of a simulation at a moment (ms).

@@ -23,7 +23,7 @@ namespace {
 using Matrix = Eigen::MatrixXd;
 using Ids = std::vector<std::uint32_t>;
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr std::size_t references = 99, redeals = 20;
+constexpr std::size_t references = 99, redeals = 20, sensible = 40;  // … types that are tried
 
 struct Medoids {
   Ids medoids, type;
@@ -171,56 +171,65 @@ Types find_types(const FeatureTable& table, const TypesOptions& options, Progres
             .components = projection.scores,
             .shares = projection.shares};
   const Matrix D = distances(out.components, out.components);
-  const std::size_t most =
-      std::max({std::size_t(1), options.types.value_or(0), std::min(options.most, n / 3)});
-
-  // What one cloud of as many cells gives, as long in each component.
-  std::vector<std::vector<double>> reference(references, std::vector<double>(most, 0.));
-  progress.begin("finding types", references + most);
-  parallel_for(references, 1, [&](std::size_t r) {
-    Random random(options.seed, r, 0x636c6f75);  // "clou"
-    Matrix cloud = out.components;
-    for (Eigen::Index c = 0; c < cloud.cols(); ++c) {
-      const double sd = out.components.col(c).norm() / std::sqrt(double(n - 1));
-      for (double& x : cloud.col(c)) x = random.normal(0., sd);
-    }
-    const Matrix C = distances(cloud, cloud);
-    for (std::size_t k = 2; k <= most; ++k) reference[r][k - 1] = silhouette(C, divide(C, k).type, k);
-    progress.advance();
-  });
-  out.divisions.resize(most);
-  parallel_for(most, 1, [&](std::size_t at) {
-    const std::size_t k = at + 1;
-    Medoids m = divide(D, k);
-    largest_first(m);
-    std::vector<double> by_chance;
-    for (const auto& r : reference) by_chance.push_back(r[at]);
-    double agreement = 0.;
-    for (std::size_t r = 0; k > 1 && r < redeals; ++r) {
-      Random random(options.seed, r * 64 + k, 0x72616e64);
-      std::vector<Eigen::Index> rows(n);
-      std::iota(rows.begin(), rows.end(), Eigen::Index(0));
-      for (std::uint32_t i = 0; i < n; ++i) std::swap(rows[i], rows[i + random.below(std::uint32_t(n) - i)]);
-      rows.resize(n * 4 / 5);
-      const Medoids again = divide(D(rows, rows), k);
-      Ids before;
-      for (const Eigen::Index row : rows) before.push_back(m.type[std::size_t(row)]);
-      agreement += adjusted_rand(before, again.type) / double(redeals);
-    }
-    out.divisions[at] = {.types = k,
-                         .type = m.type,
-                         .medoids = m.medoids,
-                         .silhouette = silhouette(D, m.type, k),
-                         .by_chance = quantile(by_chance, .95),
-                         .stability = k > 1 ? agreement : 1.};
-    progress.advance();
-  });
-  progress.end();
+  // Divisions into up to `most` types, and what one cloud of as many cells gives, as long in each component.
+  std::vector<std::vector<double>> reference(references, std::vector<double>(1, 0.));
+  const auto divide_into = [&](std::size_t most) {
+    const std::size_t done = out.divisions.size();
+    progress.begin("finding types", references + most - done);
+    parallel_for(references, 1, [&](std::size_t r) {
+      Random random(options.seed, r, 0x636c6f75);  // "clou"
+      Matrix cloud = out.components;
+      for (Eigen::Index c = 0; c < cloud.cols(); ++c) {
+        const double sd = out.components.col(c).norm() / std::sqrt(double(n - 1));
+        for (double& x : cloud.col(c)) x = random.normal(0., sd);
+      }
+      const Matrix C = distances(cloud, cloud);
+      for (std::size_t k = reference[r].size() + 1; k <= most; ++k)
+        reference[r].push_back(silhouette(C, divide(C, k).type, k));
+      progress.advance();
+    });
+    out.divisions.resize(most);
+    parallel_for(most - done, 1, [&](std::size_t i) {
+      const std::size_t at = done + i, k = at + 1;
+      Medoids m = divide(D, k);
+      largest_first(m);
+      std::vector<double> by_chance;
+      for (const auto& r : reference) by_chance.push_back(r[at]);
+      double agreement = 0.;
+      for (std::size_t r = 0; k > 1 && r < redeals; ++r) {
+        Random random(options.seed, r * 64 + k, 0x72616e64);
+        std::vector<Eigen::Index> rows(n);
+        std::iota(rows.begin(), rows.end(), Eigen::Index(0));
+        for (std::uint32_t c = 0; c < n; ++c)
+          std::swap(rows[c], rows[c + random.below(std::uint32_t(n) - c)]);
+        rows.resize(n * 4 / 5);
+        const Medoids again = divide(D(rows, rows), k);
+        Ids before;
+        for (const Eigen::Index row : rows) before.push_back(m.type[std::size_t(row)]);
+        agreement += adjusted_rand(before, again.type) / double(redeals);
+      }
+      out.divisions[at] = {.types = k,
+                           .type = m.type,
+                           .medoids = m.medoids,
+                           .silhouette = silhouette(D, m.type, k),
+                           .by_chance = quantile(by_chance, .95),
+                           .stability = k > 1 ? agreement : 1.};
+      progress.advance();
+    });
+    progress.end();
+  };
+  std::size_t most = std::max({std::size_t(1), options.types.value_or(0), std::min(options.most, n / 3)}),
+              top = 0;
+  for (;;) {
+    divide_into(most);
+    for (std::size_t at = 1; at < most; ++at)
+      if (top == 0 || out.divisions[at].silhouette > out.divisions[top].silhouette) top = at;
+    const std::size_t more = std::min({2 * most, n / 3, sensible});
+    if (options.types || 2 * (top + 1) <= most || more <= most) break;
+    most = more;  // a better one may lie beyond
+  }
 
   // The highest silhouette, if one cloud hardly ever has as high a one for any number of types.
-  std::size_t top = 0;
-  for (std::size_t at = 1; at < most; ++at)
-    if (top == 0 || out.divisions[at].silhouette > out.divisions[top].silhouette) top = at;
   const auto as_high = std::ranges::count_if(
       reference, [&](const auto& r) { return std::ranges::max(r) >= out.divisions[top].silhouette; });
   out.p = (double(as_high) + 1.) / (double(references) + 1.);

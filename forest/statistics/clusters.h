@@ -49,7 +49,8 @@ struct Types {
 };
 
 struct TypesOptions {
-  std::size_t most = 8;                   // types
+  std::size_t most =
+      8;  // types that are tried; twice as many where more than half of them are the best, three cells a type at least
   std::optional<std::size_t> types = {};  // as many; found when not said
   std::uint64_t seed = 0;
 };

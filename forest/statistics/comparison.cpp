@@ -16,6 +16,8 @@
 namespace forest::statistics {
 namespace {
 
+constexpr double tests = 5.;  // whose smallest p decides
+
 std::vector<Difference> differences(const FeatureTable& all, Eigen::Index of_a) {
   const auto features = std::size_t(all.values.cols());
   std::vector<Difference> rows(features);
@@ -93,12 +95,12 @@ Comparison compare(const FeatureTable& a, const FeatureTable& b, const Compariso
   c.sholl = band_of(a.sholl, b.sholl, b.size(), 1000, options.seed);
   c.sholl_b = mean_curve(b.sholl);
   c.sholl_inside = share_inside(c.sholl_b, c.sholl);
-  c.detectable_auc = detectable_auc(a.size(), b.size());
+  c.detectable_auc = detectable_auc(a.size(), b.size(), .05 / tests, c.forest.null);
   c.detectable_effect = detectable_effect(a.size(), b.size(), std::max<std::size_t>(c.compared(), 1));
 
   double least = std::min({c.forest.p, c.energy.p, c.mmd.p, c.barcodes.p});
   for (const Difference& d : c.differences) least = std::min(least, d.p_holm);
-  c.p = std::min(1., 5. * least);
+  c.p = std::min(1., tests * least);
   return c;
 }
 
@@ -108,8 +110,9 @@ std::string sentence(const Comparison& c, const std::string& a, const std::strin
   const Estimate& auc = c.forest.auc;
   const std::string ranks = fmt::format(
       "a random forest ranks a cell of {} above one of {} in {} of pairs (95 % interval "
-      "{}–{})",
-      b, a, percent(auc.value), percent(auc.lower), percent(auc.upper));
+      "{}–{}{})",
+      b, a, percent(auc.value), percent(auc.lower), percent(auc.upper),
+      auc.value < .5 ? "; below half is chance, too" : "");
   if (!c.told_apart())
     return fmt::format(
         "{} and {} cannot be told apart by these cells (p = {:.2g}): {}, and {} of {} features differ after "

@@ -33,7 +33,8 @@ struct DiscriminatorOptions {
 };
 
 struct Discrimination {
-  /// Mean over repeats and folds; the interval is that of the cells (area_interval of what each contributed).
+  /// Mean over repeats and folds. The interval is that of the cells (area_interval of what each contributed), and of what others would have taught
+  /// the classifier: no narrower than as permutations differ, or without them than was measured of samples of one population.
   Estimate auc{.5, 0., 1.};
   std::vector<double> repeats;  // the AUC of each
   std::vector<double> null;     // of each permutation, sorted
@@ -49,12 +50,14 @@ Discrimination discriminate(const Eigen::MatrixXd& first, const Eigen::MatrixXd&
                             Classifier classifier, const DiscriminatorOptions& options,
                             Progress& progress = Progress::none());
 
-/// The smallest AUC above 0.5 that samples of these sizes tell from guessing in four of five cases, at a level of 5 %,
-/// one-sided (Hanley & McNeil 1982).
-double detectable_auc(std::size_t first, std::size_t second);
+/// The smallest AUC above 0.5 that samples of these sizes tell from guessing in four of five cases, one-sided (Hanley & McNeil 1982).
+/// @param level  of the test
+/// @param null   AUCs of guessing, as Discrimination::null; of 20 and more the variance counts, where it is larger
+double detectable_auc(std::size_t first, std::size_t second, double level = .05,
+                      const std::vector<double>& null = {});
 
-/// The smallest |Cohen's d| of one feature among `features` that is found in four of five cases at a level of 5 % over
-/// all of them (two-sided, Bonferroni's bound, normal approximation).
+/// The smallest |Cohen's d| of one normal feature among `features` that Kolmogorov–Smirnov's test finds in four of five cases, at a level
+/// of 5 % over all of them (Bonferroni's bound). By samples drawn at random, the same each time: to some percent.
 double detectable_effect(std::size_t first, std::size_t second, std::size_t features);
 
 }  // namespace forest::statistics

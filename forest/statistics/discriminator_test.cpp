@@ -14,6 +14,8 @@
 #include "forest/statistics/random_forest.h"
 #include "forest/statistics/summary.h"
 
+#include "tests/effort.h"
+
 namespace forest::statistics {
 namespace {
 
@@ -158,8 +160,20 @@ TEST(Discriminate, RefusesAHandfulOfCells) {
 }
 
 TEST(Power, GrowsWithTheNumberOfCells) {
-  EXPECT_NEAR(detectable_effect(64, 64, 1), .495, .005);  // the textbook's: 64 a group for d = 0.5
+  EXPECT_GT(detectable_effect(64, 64, 1), .495);  // the t-test's, which makes more of normal values
   EXPECT_GT(detectable_effect(64, 64, 100), detectable_effect(64, 64, 1));
+  EXPECT_NEAR(detectable_effect(400, 400, 10), .5 * detectable_effect(100, 100, 10), .01);
+  EXPECT_GT(detectable_effect(3, 3, 100), 1e9);  // no difference can be shown
+  const double effect = detectable_effect(20, 25, 200);
+  int found = 0;
+  for (std::uint64_t trial = 0; trial < 500; ++trial) {
+    Random random(5, trial);
+    std::vector<double> x(20), y(25);
+    for (double& v : x) v = random.normal();
+    for (double& v : y) v = random.normal(effect);
+    found += kolmogorov_smirnov(x, y).p <= .05 / 200.;
+  }
+  EXPECT_NEAR(found, 400, 40);
   EXPECT_GT(detectable_auc(10, 10), detectable_auc(100, 100));
   // By drawing: samples whose means are apart as such an AUC demands are told in about four of five cases.
   const double auc = detectable_auc(30, 30);
@@ -180,6 +194,27 @@ TEST(Power, GrowsWithTheNumberOfCells) {
     told += (u / 900. - .5) / std::sqrt(61. / (12. * 900.)) > 1.644854;
   }
   EXPECT_NEAR(told, 400, 40);
+  EXPECT_GT(detectable_auc(30, 30, .01), auc);
+  std::vector<double> null(100, .4);
+  std::fill_n(null.begin(), 50, .6);
+  EXPECT_GT(detectable_auc(30, 30, .05, null), auc);  // guessing differs by .1 where ranks differ by .075
+  EXPECT_EQ(detectable_auc(30, 30, .05, std::vector<double>(100, .5)), auc);
+}
+
+// Cells of one kind dealt to two samples: an interval of 95 % leaves one half out in one case of twenty.
+TEST(Discriminate, TheIntervalHoldsWhatOtherCellsWouldHaveTaught) {
+  LONG_TEST();
+  constexpr int trials = 200;
+  for (const std::size_t permutations : {0u, 40u}) {
+    int missed = 0;
+    for (std::uint64_t trial = 0; trial < trials; ++trial) {
+      const auto told =
+          discriminate(cloud(2 * trial + 11, 25, 12), cloud(2 * trial + 12, 25, 12), Classifier::logistic,
+                       {.repeats = 10, .permutations = permutations, .seed = trial});
+      missed += told.auc.lower > .5 || told.auc.upper < .5;
+    }
+    EXPECT_LE(missed, trials / 9) << permutations;
+  }
 }
 
 }  // namespace

@@ -288,10 +288,13 @@ std::optional<Components> fitted(const Spec& spec, const Values& x, bool angles,
   return components;
 }
 
+// What the criteria charge for. A limit counts for two parameters: the likelihood falls off from an outermost value in steps of 1/n, not of 1/√n, so that
+// taking the limit from there gains log n, where half of that is what a parameter of a smooth likelihood is charged.
 int parameters_of(const Spec& spec, bool angles) {
   int sum = int(spec.size()) - 1;
   for (const Family* f : spec)
-    sum += angles && f->support == Family::interval ? 0 : f->count;  // the circle is as it is
+    if (!(angles && f->support == Family::interval))  // the circle is as it is
+      sum += f->count + int(std::ranges::count(f->is_limit, true));
   return sum;
 }
 

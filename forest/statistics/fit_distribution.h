@@ -46,7 +46,7 @@ struct ParameterEstimate {
 struct Candidate {
   std::string name;
   double log_likelihood;
-  int parameters;
+  int parameters;    // a limit, of uniform and truncnormal, counts for two
   double aicc, bic;  // aicc: infinite for fewer values than it needs
 };
 

@@ -8,21 +8,27 @@
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
 #include "forest/statistics/dealing.h"
+#include "forest/statistics/two_samples.h"
 
 namespace forest::statistics {
 
 PersistenceImages persistence_images(std::span<const Bars> cells, Eigen::Index side, double width) {
   PersistenceImages out{
       .side = side, .reach = 0., .images = Eigen::MatrixXd::Zero(Eigen::Index(cells.size()), side * side)};
-  for (const Bars& bars : cells)
-    for (const Bar& bar : bars) out.reach = std::max({out.reach, bar.birth, bar.death});
+  std::vector<double> reaches;
+  for (const Bars& bars : cells) {
+    double reach = 0.;
+    for (const Bar& bar : bars) reach = std::max({reach, bar.birth, bar.death});
+    if (!bars.empty()) reaches.push_back(reach);
+  }
+  if (!reaches.empty()) out.reach = quantile(reaches, .95);
   if (!(out.reach > 0.) || !std::isfinite(out.reach)) return out;
   parallel_for(cells.size(), 2, [&](std::size_t i) {
     Eigen::MatrixXd image = Eigen::MatrixXd::Zero(side, side);
     const auto profile = [&](double at) -> Eigen::VectorXd {
       Eigen::VectorXd p(side);
       for (Eigen::Index k = 0; k < side; ++k) {
-        const double z = ((double(k) + .5) / double(side) - at / out.reach) / width;
+        const double z = ((double(k) + .5) / double(side) - std::min(1., at / out.reach)) / width;
         p[k] = std::exp(-.5 * z * z);
       }
       return p / p.sum();  // what lies beyond the edge counts within

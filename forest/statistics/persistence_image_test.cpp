@@ -27,7 +27,7 @@ std::vector<Bars> both(std::vector<Bars> a, const std::vector<Bars>& b) {
 
 TEST(PersistenceImages, WeighEveryCellAlike) {
   const PersistenceImages p = persistence_images(std::vector<Bars>{{{100, 0}}, {{50, 0}, {60, 20}}, {}});
-  EXPECT_EQ(p.reach, 100.);
+  EXPECT_NEAR(p.reach, 98., 1e-9);  // 95 of 100 between the two cells that have bars
   EXPECT_NEAR(p.images.row(0).sum(), 1., 1e-12);
   EXPECT_NEAR(p.images.row(1).sum(), 1., 1e-12);
   EXPECT_EQ(p.images.row(2).sum(), 0.);
@@ -35,6 +35,15 @@ TEST(PersistenceImages, WeighEveryCellAlike) {
   p.images.row(0).maxCoeff(&pixel);
   EXPECT_EQ(pixel % p.side, p.side - 1);  // birth at the end of its axis
   EXPECT_EQ(pixel / p.side, 0);           // death at the start of its own
+}
+
+// One tip that is ten times as far as all others must not press all others into a corner.
+TEST(PersistenceImages, AreNotDecidedByOneCell) {
+  std::vector<Bars> far = both(cells(1, 30, 1.), cells(2, 30, 1.5));
+  const double before = barcode_distance(persistence_images(far), 30, 99, 1).distance;
+  far[3].push_back({5000., 0.});
+  EXPECT_NEAR(barcode_distance(persistence_images(far), 30, 99, 1).distance, before, .1 * before);
+  EXPECT_NEAR(persistence_images(far).images.row(3).sum(), 1., 1e-9);
 }
 
 TEST(BarcodeDistance, IsNothingForTheSameAndOneForWhatNeverMeets) {

@@ -117,18 +117,22 @@ double cohens_d(std::span<const double> a, std::span<const double> b) {
   return s.mean == t.mean ? 0. : (t.mean - s.mean) / std::sqrt(pooled);
 }
 
+double area_variance(double area, double n_first, double n_second) {
+  const double q1 = area / (2. - area), q2 = 2. * area * area / (1. + area), square = area * area;
+  return (area * (1. - area) + (n_first - 1.) * (q1 - square) + (n_second - 1.) * (q2 - square)) /
+         (n_first * n_second);
+}
+
 Estimate area_interval(double area, std::span<const double> first, std::span<const double> second,
-                       double n_first, double n_second) {
+                       double n_first, double n_second, double learned) {
   const double least = .5 / std::max(2., std::min(n_first, n_second));
   const double inside = std::clamp(area, least, 1. - least);
-  const double q1 = inside / (2. - inside), q2 = 2. * inside * inside / (1. + inside);
-  const double floor = (inside * (1. - inside) + (n_first - 1.) * (q1 - inside * inside) +
-                        (n_second - 1.) * (q2 - inside * inside)) /
-                       (n_first * n_second);
+  const double floor = area_variance(inside, n_first, n_second);
   const double delong = variance(first) / n_first + variance(second) / n_second;
   constexpr double few = 8.;  // of so few the variance is no measure; of one it is none
   const double spread =
-      area == inside && std::min(n_first, n_second) >= few ? delong : std::max(delong, floor);
+      std::max(area == inside && std::min(n_first, n_second) >= few ? delong : std::max(delong, floor),
+               learned * floor);
   const double logit = std::log(inside / (1. - inside));
   const double reach = 1.959964 * std::sqrt(spread) / (inside * (1. - inside));
   const auto back = [](double x) { return 1. / (1. + std::exp(-x)); };

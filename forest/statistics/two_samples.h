@@ -50,7 +50,12 @@ double quantile(std::span<const double> values, double share);
 
 /// DeLong's interval of an area from what each cell of both samples contributes: its mean chance to be ordered rightly
 /// against the cells of the other.
+/// @param learned  of an area by a classifier, how many times the variance of ranks among given cells (Hanley & McNeil) it has at least,
+///                 since other cells would have taught it otherwise; 0: of given numbers
 Estimate area_interval(double area, std::span<const double> first, std::span<const double> second,
-                       double n_first, double n_second);
+                       double n_first, double n_second, double learned = 0.);
+
+/// Of the area under the curve of samples of these sizes, in which it is so large (Hanley & McNeil 1982).
+double area_variance(double area, double n_first, double n_second);
 
 }  // namespace forest::statistics

@@ -24,7 +24,7 @@ for name in a:
     assert a[name]["count"] == 0 or math.isclose(a[name]["kolmogorov"] or 0, b[name]["kolmogorov"] or 0, abs_tol=.01), name
 # What the grammar says: basal_fork = 0: 0.95, 1: 0.9, 2: 0.65, 3: 0.4, …
 for bin, chance in zip(files["nontermination_by"]["order"], (0.95, 0.9, 0.65, 0.4)):
-    assert bin["lower"] - .03 <= chance <= bin["upper_limit"] + .03, (bin, chance)
+    assert bin["lower"] - .03 <= chance <= bin["upper"] + .03, (bin, chance)
 # … terminal branches of normal(105, 25) µm, at least 30; forks of 60 ± 18 degrees.
 length = a["length_of_terminal_segments"]
 assert abs(length["estimates"][0]["value"] - 105) < 5 and length["family"] in ("normal", "truncnormal", "weibull"), length
@@ -58,7 +58,7 @@ $BRAINFOREST distributions cells --kind basal --by order --least 60 --replicates
 python3 - <<'PY'
 import json
 for q in json.load(open("by.json"))["quantities"]:
-    uppers = [b["upper"] for b in q["bins"]]
+    uppers = [b["up_to"] for b in q["bins"]]
     assert uppers == sorted(set(uppers))
     assert all(b["count"] >= 60 for b in q["bins"]) or len(q["bins"]) == 1
     assert sum(b["count"] for b in q["bins"]) == q["count"]
