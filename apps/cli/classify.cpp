@@ -232,13 +232,13 @@ void run(const Options& options, Console& console) {
   const Sample sample = options.repo.empty() ? read_sample(options.files, {}, console)
                                              : read_sample({options.population}, options.repo, console);
   must_have_sections(sample, options.kind);
-  warn_of_copies(sample, console);
   const FeatureTable table = measured(sample, groups_of(options.kind), console);
   const Types t =
       find_types(table,
                  {.types = options.types ? std::optional<std::size_t>(options.types) : std::nullopt,
                   .seed = options.seed},
                  console.progress());
+  warn_of_copies(sample, console);
   const Given given = given_types(sample);
   console.print(json_of(t, sample, given, options));
   console.say(sentence(t, given, options));

@@ -54,6 +54,7 @@ Json json_of(const Comparison& c, const std::array<std::string, 2>& names, const
     metrics.push_back({{"name", d.feature.name},
                        {"unit", d.feature.unit},
                        {"diameters", d.feature.diameters},
+                       {"tracing", d.feature.tracing},
                        {"a", {{"mean", d.mean_a}, {"sd", d.sd_a}}},
                        {"b", {{"mean", d.mean_b}, {"sd", d.sd_b}}},
                        {"cliffs_delta", told(interval_of(d.delta))},
@@ -72,6 +73,7 @@ Json json_of(const Comparison& c, const std::array<std::string, 2>& names, const
           {"sentence", sentence(c, names[0], names[1])},
           {"random_forest", json_of(c.forest)},
           {"random_forest_structure", json_of(c.structure)},
+          {"random_forest_branching", json_of(c.branching)},
           {"logistic", json_of(c.logistic)},
           {"energy", {{"distance", c.energy.distance}, {"p", c.energy.p}}},
           {"mmd", {{"distance", c.mmd.distance}, {"p", c.mmd.p}}},
@@ -113,6 +115,7 @@ std::vector<const Difference*> telling(const Comparison& c, const FeatureTable& 
 std::vector<std::vector<std::string>> rows_of_tests(const Comparison& c) {
   return {{"random forest, all features", with_interval(c.forest.auc), shown_p(c.forest.p)},
           {"random forest, structure", with_interval(c.structure.auc), "-"},
+          {"random forest, branching alone", with_interval(c.branching.auc), "-"},
           {"logistic regression, all features", with_interval(c.logistic.auc), shown_p(c.logistic.p)},
           {"energy distance", readable(c.energy.distance), shown_p(c.energy.p)},
           {"maximum mean discrepancy", readable(c.mmd.distance), shown_p(c.mmd.p)},

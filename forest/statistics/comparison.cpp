@@ -56,7 +56,8 @@ std::string percent(double share) { return fmt::format("{:.0f} %", 100. * share)
 Comparison compare(const FeatureTable& a, const FeatureTable& b, const ComparisonOptions& options,
                    Progress& progress) {
   const std::array<FeatureTable, 2> both{a, b};
-  const FeatureTable all = stacked(both), whole = completed(all), structure = completed(structure_of(all));
+  const FeatureTable all = stacked(both), whole = completed(all), structure = completed(structure_of(all)),
+                     branching = completed(branching_of(all));
   const auto of_a = Eigen::Index(a.size()), of_b = Eigen::Index(b.size());
   Comparison c;
   c.cells_a = a.size(), c.cells_b = b.size();
@@ -74,6 +75,11 @@ Comparison compare(const FeatureTable& a, const FeatureTable& b, const Compariso
   c.logistic = discriminate(X.topRows(of_a), X.bottomRows(of_b), Classifier::logistic, with, progress);
   c.structure =
       discriminate(S.topRows(of_a), S.bottomRows(of_b), Classifier::random_forest, without, progress);
+  if (branching.features.size() > 0) {
+    const Eigen::MatrixXd B = standardised(branching);
+    c.branching =
+        discriminate(B.topRows(of_a), B.bottomRows(of_b), Classifier::random_forest, without, progress);
+  }
   c.energy = energy_distance(X.topRows(of_a), X.bottomRows(of_b), options.dealings, options.seed, slices);
   c.mmd = mean_discrepancy(X.topRows(of_a), X.bottomRows(of_b), options.dealings, options.seed, slices);
 
@@ -125,6 +131,18 @@ std::string sentence(const Comparison& c, const std::string& a, const std::strin
   const std::string alone =
       of_one ? fmt::format(" {} more {} defined in one of the two alone.", of_one, of_one == 1 ? "is" : "are")
              : std::string();
+  // What a tracer's habits and the lie of a slice do, which no cell is to blame for.
+  const double beyond = c.branching.auc.value;
+  const std::string traced = beyond >= c.detectable_auc
+                                 ? fmt::format(
+                                       " By branching alone, whatever diameters were given, however densely "
+                                       "points were set and however the cells lay, it is {}.",
+                                       percent(beyond))
+                                 : fmt::format(
+                                       " That may be how they were traced: without diameters, and without "
+                                       "what depends on how densely "
+                                       "points were set and how the cells lay, it is {}.",
+                                       percent(beyond));
   const char* how = auc.value >= .95   ? "almost always"
                     : auc.value >= .8  ? "mostly"
                     : auc.value >= .65 ? "more often than not"
@@ -138,8 +156,8 @@ std::string sentence(const Comparison& c, const std::string& a, const std::strin
   }
   return fmt::format(
       "{} and {} can be told apart {} (p ≤ {:.2g}): {}; {} of {} features differ after Holm's "
-      "correction{}.{}",
-      a, b, how, c.p, ranks, differ, c.compared(), by.empty() ? "" : ", led by " + by, alone);
+      "correction{}.{}{}",
+      a, b, how, c.p, ranks, differ, c.compared(), by.empty() ? "" : ", led by " + by, alone, traced);
 }
 
 }  // namespace forest::statistics

@@ -44,6 +44,7 @@ struct Comparison {
   std::vector<Difference> differences;  // those that differ after Holm first, then by |delta|
   Discrimination forest, logistic;      // on all features, with permutations
   Discrimination structure;             // random forest without what depends on diameters
+  Discrimination branching;  // … nor on how densely branches were traced or how cells lay; of no features: .5
   DistanceTest energy, mmd;
   DistanceTest barcodes;  // of mean persistence images
   Band sholl;             // around the mean of a, as wide as a sample like b may be by chance

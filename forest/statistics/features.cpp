@@ -36,6 +36,43 @@ constexpr auto slopes = std::to_array<std::string_view>({"length_along_z_by_x", 
                                                          "section_length_fractions_along_z",
                                                          "segment_elevations", "level_segment_fraction"});
 
+// What else changes when the same cell is traced by more points, or lies turned about the direction of the pia; of points everything does.
+constexpr auto tracing = std::to_array<std::string_view>({"number_of_segments",
+                                                          "width",
+                                                          "height",
+                                                          "depth",
+                                                          "total_width",
+                                                          "total_depth",
+                                                          "surface",
+                                                          "volume",
+                                                          "aspect_ratio",
+                                                          "circularity",
+                                                          "shape_factor",
+                                                          "fractal_dimension_boxes",
+                                                          "section_taper_rates",
+                                                          "taper_1",
+                                                          "taper_2",
+                                                          "fragmentation",
+                                                          "fractal_dim",
+                                                          "parent_daughter_ratio",
+                                                          "diam_threshold",
+                                                          "sibling_ratios",
+                                                          "daughter_ratio",
+                                                          "rall_power",
+                                                          "pk",
+                                                          "pk_classic",
+                                                          "pk_2",
+                                                          "diameter_power_relations",
+                                                          "hillman_threshold",
+                                                          "principal_direction_extents",
+                                                          "principal_direction_extents_2",
+                                                          "principal_direction_extents_3",
+                                                          "trunk_vectors_x",
+                                                          "trunk_vectors_z",
+                                                          "trunk_origin_azimuths",
+                                                          "trunk_origin_elevations",
+                                                          "trunk_angles"});
+
 // What one number tells better than a forest among all others, of what is measured together first: whether cells are too deep (a plane
 // has two directions to turn a neuron in, so that lengths along one of them are what lengths along z can be measured by), and whether
 // branches lie in the planes of focus that they were traced in.
@@ -60,10 +97,15 @@ const std::vector<const Metric*>& chosen() {
   return all;
 }
 
+bool listed(std::span<const std::string_view> names, const Metric& m) {
+  return std::ranges::count(names, m.name) > 0;
+}
+
 std::vector<Feature> columns_of(const Metric& m, const std::string& group) {
   const auto column = [&](std::string_view part, std::string_view unit) {
     return Feature{fmt::format("{} {}{}{}", group, m.name, part.empty() ? "" : " ", part), std::string(unit),
-                   m.diameters, std::ranges::count(slopes, m.name) > 0};
+                   m.diameters, m.level == Level::point || listed(tracing, m) || listed(slopes, m),
+                   listed(slopes, m)};
   };
   if (m.level == Level::neuron) return {column("", m.unit)};
   if (m.level == Level::shell) {
@@ -237,6 +279,10 @@ FeatureTable columns_that(const FeatureTable& table, auto&& wanted) {
 
 FeatureTable structure_of(const FeatureTable& table) {
   return columns_that(table, [](const Feature& f) { return !f.diameters; });
+}
+
+FeatureTable branching_of(const FeatureTable& table) {
+  return columns_that(table, [](const Feature& f) { return !f.diameters && !f.tracing; });
 }
 
 FeatureTable slopes_of(const FeatureTable& table) {

@@ -19,8 +19,9 @@ namespace forest::statistics {
 struct Feature {
   std::string name;  // "basal contraction sd": group, metric, summary
   std::string unit;
-  bool diameters = false;       // changes when nothing but diameters do
-  bool slope = false;           // says how steeply branches leave the plane of the slice
+  bool diameters = false;  // changes when nothing but diameters do
+  bool tracing = false;    // changes with how densely branches were traced, or how the cell lay in its slice
+  bool slope = false;      // says how steeply branches leave the plane of the slice
   std::string_view alone = {};  // what the protocol calls it where it asks of it by itself: "depth", "level"
 
   bool operator==(const Feature&) const = default;
@@ -68,6 +69,9 @@ FeatureTable stacked(std::span<const FeatureTable> tables);
 FeatureTable rows_of(const FeatureTable& table, std::span<const std::size_t> rows);
 /// Only what does not depend on diameters: the structure.
 FeatureTable structure_of(const FeatureTable& table);
+/// Of the structure what is the same however densely branches were traced and however the cell lay: turned about the direction of the
+/// pia; it may be nothing.
+FeatureTable branching_of(const FeatureTable& table);
 /// Only how steep branches are in the slice; it may be nothing.
 FeatureTable slopes_of(const FeatureTable& table);
 

@@ -15,6 +15,7 @@
 #include "forest/core/error.h"
 #include "forest/core/random.h"
 #include "forest/morphology/measure.h"
+#include "forest/statistics/features.h"
 #include "forest/statistics/summary.h"
 
 namespace forest::statistics {
@@ -292,6 +293,30 @@ TEST(Metrics, DoNotDependOnHowDenselyABranchWasTraced) {
     for (const Metric& metric : metrics())
       if (metric.level != Level::point && !local.contains(metric.name))
         expect_same(metric, m, denser, 1., 1e-3);
+  }
+}
+
+// More points, or a quarter of a turn about the direction of the pia: features that are not said to tell of the tracing stay.
+TEST(Features, SayWhetherTheyTellOfTheTracing) {
+  const auto groups = groups_of("all");
+  const std::vector<Feature> features = features_of(groups);
+  std::size_t kept = 0;
+  for (const Feature& f : features) kept += !f.diameters && !f.tracing;
+  EXPECT_GT(kept, 150u);
+  const auto turned = [](Point p) { return Point{p.z, p.y, -p.x, p.radius}; };
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const Morphology m = wild(seed);
+    const std::vector<double> was = measure(m, groups).features;
+    for (const Morphology& other : {changed(m, same, 3), changed(m, turned)}) {
+      const std::vector<double> is = measure(other, groups).features;
+      for (std::size_t i = 0; i < features.size(); ++i) {
+        if (features[i].diameters || features[i].tracing) continue;
+        EXPECT_EQ(std::isnan(was[i]), std::isnan(is[i])) << features[i].name;
+        if (!std::isnan(was[i])) {
+          EXPECT_NEAR(is[i], was[i], 1e-3 * (1. + std::abs(was[i]))) << features[i].name;
+        }
+      }
+    }
   }
 }
 
