@@ -197,7 +197,9 @@ std::string report_of(const Comparison& c, const std::array<FeatureTable, 2>& ta
                    "where its branch begins (µm)"),
         fmt::format(
             "Mean persistence images: every branch by how far from the soma its tip is and where it leaves a "
-            "longer one; opacity goes with the square root. They share {:.0f} % (p = {}).",
+            "longer one, in percent of its population's branches a pixel (the square root decides the shade; "
+            "both have "
+            "one scale). What lies beyond the axes counts at their ends. They share {:.0f} % (p = {}).",
             100. * (1. - c.barcodes.distance), shown_p(c.barcodes.p)));
 
   report.heading("The cells");

@@ -352,21 +352,44 @@ std::string scatter_plot(std::span<const Dot> dots, std::span<const std::string>
   return svg.done(476. + down, "Cells in the plane of two components");
 }
 
+namespace {
+
+// In the free corner above the diagonal: what shades mean, in percent of branches a pixel.
+void heat_scale(Svg& svg, const HeatPanel& h, double left, double top, double most) {
+  constexpr double length = 90., high = 8.;
+  constexpr int steps = 30;
+  const double least = h.difference ? -1. : 0.;
+  for (int i = 0; i < steps; ++i) {
+    const double at = least + (1. - least) * (i + .5) / steps;
+    svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.2f}" height="{}" fill="{}" fill-opacity="{:.2f}"/>)",
+            left + 8. + length * i / steps, top, length / steps + .15, high,
+            colour_of(h.difference ? at > 0. : h.colour), std::sqrt(std::abs(at)));
+  }
+  const auto percent = [&](double share) { return fmt::format("{:.2g} %", 100. * std::abs(share)); };
+  svg.text(left + 8., top + 20., percent(least * most), "start", 10.5, .7);
+  svg.text(left + 8. + length, top + 20., percent(most), "end", 10.5, .7);
+}
+
+}  // namespace
+
 std::string heat_plots(std::span<const HeatPanel> panels, std::size_t side, double reach,
                        const std::string& x_title, const std::string& y_title) {
   Svg svg;
   constexpr double panel = 240., gap = 48., top = 34.;
+  std::array<double, 2> mosts{1e-300,
+                              1e-300};  // of shares, and of differences: panels of a kind have one scale
+  for (const HeatPanel& h : panels)
+    for (const double v : h.values) mosts[h.difference] = std::max(mosts[h.difference], std::abs(v));
   for (std::size_t p = 0; p < panels.size(); ++p) {
     const HeatPanel& h = panels[p];
-    const double left = 56. + double(p) * (panel + gap), pixel = panel / double(side);
-    double most = 1e-300;
-    for (const double v : h.values) most = std::max(most, std::abs(v));
+    const double left = 56. + double(p) * (panel + gap), pixel = panel / double(side),
+                 most = mosts[h.difference];
     svg.fitted(left, top - 14., panel + gap - 12., h.title, "start",
                width_of(h.title, 12.) > panel + gap - 12. ? 10.5 : 12.);
     for (std::size_t i = 0; i < h.values.size() && i < side * side; ++i) {
       const double share =
-          std::sqrt(std::abs(h.values[i]) / most);  // so that rare branches show beside frequent ones
-      if (share < .03) continue;
+          std::sqrt(std::abs(h.values[i]) / most);       // so that rare branches show beside frequent ones
+      if (share < .03 || i / side > i % side) continue;  // nothing begins beyond its tip
       svg.add(
           R"(<rect x="{:.1f}" y="{:.1f}" width="{:.2f}" height="{:.2f}" fill="{}" fill-opacity="{:.2f}"/>)",
           left + pixel * double(i % side), top + panel - pixel * double(i / side + 1), pixel + .15,
@@ -376,10 +399,11 @@ std::string heat_plots(std::span<const HeatPanel> panels, std::size_t side, doub
     svg.line(x(0.), y(0.), x(reach), y(reach), .3, R"(stroke-dasharray="3 3")");
     svg.line(left, top + panel, left + panel, top + panel, .5);
     svg.line(left, top, left, top + panel, .5);
-    bottom_marks(svg, x, {top + panel, top + panel}, 4, 10.5, left - .4 * gap, left + panel + .4 * gap);
+    bottom_marks(svg, x, {top + panel, top + panel}, 6, 10.5, left - .4 * gap, left + panel + .4 * gap);
     if (p == 0)
-      for (const Mark& m : marks(y, 4, 0.)) svg.text(left - 6., y(m.at) + 4., m.words, "end", 10.5, .7);
+      for (const Mark& m : marks(y, 6, 0.)) svg.text(left - 6., y(m.at) + 4., m.words, "end", 10.5, .7);
     svg.text(left + .5 * panel, top + panel + 36., x_title, "middle", 11.5, .85);
+    heat_scale(svg, h, left, top + 6., most);
   }
   svg.add(
       R"~(<text transform="translate(14 {:.1f}) rotate(-90)" text-anchor="middle" font-size="11.5" fill="currentColor" fill-opacity=".85">{}</text>)~",
