@@ -2,11 +2,14 @@
 // brainforest measure: the metrics of neurons, or of groups of them, as a table, CSV, workbook or JSON.
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <memory>
+#include <numeric>
 #include <set>
+#include <utility>
 #include <variant>
 
 #include <CLI/App.hpp>
@@ -508,15 +511,35 @@ void run(const Options& options, Console& console) {
                             measured.size()));
 }
 
-/// What to say of a name that no metric has: those that NeuroM has in one name and we in several, or that begin with the same word.
+/// How many letters must be put in, left out or replaced to make one of the other, whatever is large or small (Levenshtein 1966).
+std::size_t slips(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t(0));
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = std::exchange(row[0], i + 1);
+    for (std::size_t k = 0; k < b.size(); ++k) {
+      const bool same =
+          std::tolower(static_cast<unsigned char>(a[i])) == std::tolower(static_cast<unsigned char>(b[k]));
+      diagonal = std::exchange(row[k + 1], std::min({row[k] + 1, row[k + 1] + 1, diagonal + !same}));
+    }
+  }
+  return row.back();
+}
+
+/// What to say of a name that no metric has: those at most two slips away, or those that NeuroM has in one name and we in several, or that begin
+/// with the same word.
 std::string no_such_metric(std::string_view name) {
   std::vector<std::string_view> like;
+  for (const Metric& m : metrics())
+    for (const std::string_view known : {std::string_view(m.name), std::string_view(m.l_measure)})
+      if (!known.empty() && slips(name, known) <= 2 && slips(name, known) < name.size() / 2)
+        like.push_back(known);
   for (const std::string_view beginning : {name, name.substr(0, name.find('_'))}) {
+    if (!like.empty()) break;
     for (const Metric& m : metrics())
       if (!beginning.empty() && m.name.size() > beginning.size() && m.name.starts_with(beginning) &&
           m.name[beginning.size()] == '_')
         like.push_back(m.name);
-    if (!like.empty()) break;
   }
   return fmt::format("There is no metric called '{}'{}; --list shows them", name,
                      like.empty() ? "" : fmt::format(", but {}", fmt::join(like, ", ")));

@@ -139,6 +139,8 @@ fails_with 1 'folder' $BRAINFOREST measure fork.swc --csv missing/folder/cells.c
 
 fails_with 2 'files' $BRAINFOREST measure
 fails_with 2 "no metric called 'trunk_vectors', but trunk_vectors_x, trunk_vectors_y, trunk_vectors_z" $BRAINFOREST measure fork.swc --metric trunk_vectors
+fails_with 2 "no metric called 'total_lenght', but total_length, total_height;" $BRAINFOREST measure fork.swc --metric total_lenght
+fails_with 2 "but Soma_Surface;" $BRAINFOREST measure fork.swc --metric soma_surface
 fails_with 2 'no metric called' $BRAINFOREST measure fork.swc --metric lengthiness
 fails_with 2 'no kind of section' $BRAINFOREST measure fork.swc --kind dragon
 fails_with 2 'no value for each section' $BRAINFOREST measure fork.swc --level section --metric total_length
