@@ -30,7 +30,10 @@ const QColor trace_colours[] = {{230, 159, 0}, {86, 180, 233},  {0, 178, 130},  
 const QColor ground(13, 16, 22), frame_colour(37, 45, 57), faint(108, 120, 138), ink(207, 215, 226),
     moment_colour(255, 255, 255, 190), spike_colour(255, 250, 220);
 
-QColor colour_of(const Vec3& c) { return QColor::fromRgbF(c.x(), c.y(), c.z()); }
+// Of a value as branches show it in the picture beside.
+QColor colour_on_branches(const Viewport& viewport, const scene::ColourMap& map, float t) {
+  return to_screen(scene::on_branches(map, t, viewport.settings().view.background));
+}
 
 // Around a plot, points: what its axes need.
 constexpr int axis_left = 44, axis_right = 8, axis_below = 20, axis_top = 18;
@@ -89,8 +92,9 @@ void RasterView::draw() {
   for (std::size_t code = 0; code < 256; ++code) {
     const float value = activity.facts().range.value(reports::Code(code));
     const bool none = std::isnan(value) || (look.threshold && value < *look.threshold);
-    colours[code] = none ? frame_colour.rgb()
-                         : colour_of(look.map->screen((value - look.low) / (look.high - look.low))).rgb();
+    colours[code] =
+        none ? frame_colour.rgb()
+             : colour_on_branches(viewport_, *look.map, (value - look.low) / (look.high - look.low)).rgb();
   }
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x)
@@ -146,7 +150,7 @@ void RasterView::paintEvent(QPaintEvent*) {
       const double rows = double(activity.rows().size()), line = area.height() / rows;
       const QRectF mark(area.left(), area.top() + *row * line - 1., area.width() - 1.,
                         std::max(line, 2.) + 1.);
-      painter.setPen(QPen(QColor(255, 90, 130), 1.4));
+      painter.setPen(QPen(Qt::white, 1.4));  // as the rim in the picture
       painter.drawRect(mark);
     }
 }
@@ -332,12 +336,8 @@ ActivityPanel::ActivityPanel(Viewport& viewport, std::function<void(double)> cla
   map_->setToolTip(tr("Colours of the values; but for cool-warm more is always lighter"));
   map_->setFocusPolicy(Qt::TabFocus);
   map_->setIconSize({72, 12});
-  for (const scene::ColourMap& map : scene::colour_maps()) {
-    QPixmap icon(72, 12);
-    QPainter painter(&icon);
-    for (int x = 0; x < 72; ++x) painter.fillRect(x, 0, 1, 12, colour_of(map.screen(float(x) / 71.f)));
-    map_->addItem(QIcon(icon), map.name);
-  }
+  for (const scene::ColourMap& map : scene::colour_maps()) map_->addItem(map.name);
+  paint_maps();
   connect(map_, &QComboBox::activated, this, [this] { edit(); });
   low_ = field("From", "", "The value at the lower end of the colours", -1e6, 1e6);
   high_ = field("to", "", "The value at the upper end of the colours", -1e6, 1e6);
@@ -384,6 +384,21 @@ QDoubleSpinBox* ActivityPanel::field(const char* name, const char* unit, const c
   return box;
 }
 
+void ActivityPanel::paint_maps() {
+  constexpr int width = 72, height = 12;
+  background_ = viewport_.settings().view.background;
+  for (int i = 0; i < map_->count(); ++i) {
+    QPixmap icon(width, height);
+    QPainter painter(&icon);
+    for (int x = 0; x < width; ++x)
+      painter.fillRect(
+          x, 0, 1, height,
+          colour_on_branches(viewport_, scene::colour_maps()[std::size_t(i)], float(x) / float(width - 1)));
+    painter.end();
+    map_->setItemIcon(i, QIcon(icon));
+  }
+}
+
 void ActivityPanel::edit() {
   scene::ActivityView look = viewport_.activity();
   look.map = &scene::colour_maps()[std::size_t(std::max(0, map_->currentIndex()))];
@@ -399,6 +414,10 @@ void ActivityPanel::follow() {
   const scene::Playback* playback = viewport_.playback();
   setEnabled(playback != nullptr);
   if (!playback) return;
+  if (background_ != viewport_.settings().view.background) {
+    paint_maps();
+    raster_->forget();
+  }
   const auto step = playback->step_at(viewport_.time());
   const QSignalBlocker quiet[] = {QSignalBlocker(slider_),    QSignalBlocker(rate_),
                                   QSignalBlocker(low_),       QSignalBlocker(high_),

@@ -77,12 +77,14 @@ class ActivityPanel final : public QWidget {
 
  private:
   QDoubleSpinBox* field(const char* name, const char* unit, const char* hint, double low, double high);
-  void edit();  // the look, as the fields have it
+  void edit();        // the look, as the fields have it
+  void paint_maps();  // in the colours that branches have on the background
 
   static constexpr std::size_t most = 8;  // traces; the oldest gives way
   Viewport& viewport_;
   std::function<void(double)> clamped_;
   std::vector<reports::Trace> traces_;
+  scene::Background background_ = scene::Background::dark;
   QPushButton* play_;
   QSlider* slider_;
   QLabel* moment_;

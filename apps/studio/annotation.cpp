@@ -34,25 +34,28 @@ QColor to_screen(const Vec3& linear) {
   return QColor::fromRgbF(c.x(), c.y(), c.z());
 }
 
-void paint_scale(QPainter& painter, const QRect& area, const frame::Camera& camera, const Ink& ink) {
+QRectF paint_scale(QPainter& painter, const QRect& area, const frame::Camera& camera, const Ink& ink) {
   const scene::ScaleBar bar = scene::scale_bar(camera, float(area.height()), 160.f);
   const auto width = qreal(bar.length);
   const QPointF left(area.left() + margin + 10, area.bottom() - margin - 10),
       right = left + QPointF(width, 0);
   const QString label = QString::fromStdString(bar.label);
   const qreal text_width = painter.fontMetrics().horizontalAdvance(label);
-  plate(painter, QRectF(left - QPointF(10, 28), QSizeF(std::max(width, text_width) + 20, 38)), ink);
+  const QRectF taken(left - QPointF(10, 28), QSizeF(std::max(width, text_width) + 20, 38));
+  plate(painter, taken, ink);
   painter.setPen(QPen(ink.text, 1.6));
   painter.drawLine(left, right);
   for (const QPointF& end : {left, right}) painter.drawLine(end - QPointF(0, 4), end + QPointF(0, 4));
   painter.drawText(left - QPointF(0, 9), label);
+  return taken;
 }
 
 void paint_directions(QPainter& painter, const QRect& area, const frame::Camera& camera, const Ink& ink,
-                      const std::optional<Vec3>& pia) {
-  constexpr qreal length = 30;
-  const QPointF centre(area.right() - margin - 40, area.bottom() - margin - 40);
-  plate(painter, QRectF(centre - QPointF(48, 48), QSizeF(96, 96)), ink);
+                      const std::optional<Vec3>& pia, const QRectF& taken) {
+  constexpr qreal length = 30, half = 48, gap = 8;
+  QPointF centre(area.right() - margin - 40, area.bottom() - margin - 40);
+  if (centre.x() - half < taken.right() + gap) centre.setY(taken.top() - gap - half);
+  plate(painter, QRectF(centre - QPointF(half, half), QSizeF(2 * half, 2 * half)), ink);
   struct Axis {
     const char* name;
     Vec3 way;
@@ -142,6 +145,18 @@ void Explanations::add(const scene::ColourBar& bar) {
     const QRectF below(top + QPointF(0, thick + 4), QSizeF(width, line));
     painter_.drawText(below, Qt::AlignLeft, QString::fromStdString(bar.ends().first));
     painter_.drawText(below, Qt::AlignRight, QString::fromStdString(bar.ends().second));
+    const auto wide_as = [&](const std::string& text) {
+      return qreal(painter_.fontMetrics().horizontalAdvance(QString::fromStdString(text)));
+    };
+    constexpr qreal apart = 8.;
+    const qreal end = width - wide_as(bar.ends().second) - apart;
+    for (qreal begin = wide_as(bar.ends().first) + apart; const auto& tick : bar.between()) {
+      const qreal at = qreal(tick.at) * width, half = .5 * wide_as(tick.label);
+      if (at - half < begin || at + half > end) continue;
+      painter_.drawText(below.adjusted(at - half, 0, 0, 0), Qt::AlignLeft,
+                        QString::fromStdString(tick.label));
+      begin = at + half + apart;
+    }
     top.ry() += thick + 6 + line;
   }
   painter_.setPen(bar.map ? ink_.faint : ink_.text);
@@ -161,7 +176,7 @@ void paint_gaze(QPainter& painter, const QPointF& place, const Ink& ink) {
   painter.drawPoint(place);
 }
 
-void mark_selection(frame::Palette& palette, scene::Background background, bool dim) {
+void mark_selection(frame::Palette& palette, scene::Background background, bool dim, bool values) {
   const bool light = background != scene::Background::dark;
   if (dim) {
     const Vec3 back = light ? Vec3(.80f, .84f, .90f) : Vec3(.006f, .008f, .012f);
@@ -172,7 +187,9 @@ void mark_selection(frame::Palette& palette, scene::Background background, bool 
           i != scene::fading_entry)
         palette[i] = kept * palette[i] + (1.f - kept) * back;
   }
-  palette[scene::section_entry] = light ? Vec3(.75f, .04f, .12f) : Vec3(1.f, .22f, .42f);
+  palette[scene::section_entry] = values  ? Vec3(Vec3::Constant(light ? 0.f : 1.f))
+                                  : light ? Vec3(.75f, .04f, .12f)
+                                          : Vec3(1.f, .22f, .42f);
   palette[scene::highlight_entry] = light ? Vec3(.05f, .05f, .35f) : Vec3(.80f, .90f, 1.f);
 }
 

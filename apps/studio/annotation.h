@@ -21,12 +21,12 @@ struct Ink {
 Ink ink_on(scene::Background background);
 QColor to_screen(const Vec3& linear);
 
-/// A bar of a round number of µm or mm, true at the target's depth; at the bottom left.
-void paint_scale(QPainter& painter, const QRect& area, const frame::Camera& camera, const Ink& ink);
-/// The axes; at the bottom right.
+/// A bar of a round number of µm or mm, true at the target's depth; at the bottom left. Returns what it takes up.
+QRectF paint_scale(QPainter& painter, const QRect& area, const frame::Camera& camera, const Ink& ink);
+/// The axes; at the bottom right, above what is `taken` where there is no room beside it.
 /// @param pia  which way it lies, if any: along y as in a column, or along an arrow of its own
 void paint_directions(QPainter& painter, const QRect& area, const frame::Camera& camera, const Ink& ink,
-                      const std::optional<Vec3>& pia);
+                      const std::optional<Vec3>& pia, const QRectF& taken);
 /// What colours mean, one explanation below the other at the top left.
 class Explanations {
  public:
@@ -45,6 +45,7 @@ class Explanations {
 void paint_gaze(QPainter& painter, const QPointF& place, const Ink& ink);
 
 /// Sets the colour of the picked section, and dims the forest behind a selection.
-void mark_selection(frame::Palette& palette, scene::Background background, bool dim);
+/// @param values  branches have the colours of values: the mark has one that no map of colours holds between its ends
+void mark_selection(frame::Palette& palette, scene::Background background, bool dim, bool values);
 
 }  // namespace forest::studio

@@ -84,9 +84,8 @@ frame::Camera dolly(const frame::Camera& camera, const frame::Viewport& viewport
 
 frame::Camera focused(frame::Camera camera, float depth) {
   if (camera.orthographic() || !(depth > 0.f)) return camera;
-  Bearing b = bearing(camera);
-  b.distance = depth;
-  return looking(camera, b);
+  camera.target = camera.eye + clamped(camera, depth) * (camera.target - camera.eye).stableNormalized();
+  return camera;
 }
 
 frame::Camera fly(const frame::Camera& camera, const Vec3& way) {

@@ -114,7 +114,12 @@ int run(const Options& options, int& argc, char** argv) {
       scene::overview(forest, float(std::max(200, about.width() - 340)) / float(about.height() - 40));
   view.camera.near = .5f;
   if (alone) view.camera = surfaces.camera(surfaces.outside(), 1.6f), view.fog = 0.f;
-  if (!options.view.empty()) view = read_view(options.view, forest.circuit().up, &view);
+  bool skin = false;
+  if (!options.view.empty()) {
+    view = read_view(options.view, forest.circuit().up, &view);
+    skin = asks_for_skin(
+        [&](const scene::View& unless) { return read_view(options.view, forest.circuit().up, &unless); });
+  }
   std::optional<scene::Playback> playback;
   if (!options.activity.empty()) playback.emplace(scene::Playback::open(forest, options.activity));
   std::optional<scene::Synapses> synapses = synapses_of(options, forest);
@@ -141,8 +146,13 @@ int run(const Options& options, int& argc, char** argv) {
 
   Window window(forest, view, QString::fromStdString(options.forest.filename().string()), std::move(sets),
                 options.drawer);
-  if (size.isValid()) window.resize(size);
+  if (size.isValid()) window.resize((QSizeF(size) / window.devicePixelRatioF()).toSize());
   if (options.report) report(window);
+  if (skin) {
+    Settings settings = window.viewport().settings();
+    settings.skin = true;
+    window.viewport().change(settings);
+  }
   if (!surfaces.empty()) window.viewport().show(surfaces);
   if (synapses) window.viewport().show(std::move(*synapses));
   if (playback) window.viewport().play(std::move(*playback));
@@ -194,7 +204,7 @@ int main(int argc, char** argv) {
       ->allow_extra_args(false);
   app.add_option("--overlay", options.overlays, "Values or areas that colour the surfaces, in their order")
       ->allow_extra_args(false);
-  app.add_option("--size", options.size, "Size of the window in pixels, for example 1280x800");
+  app.add_option("--size", options.size, "Size of the window in pixels of the screen, for example 1280x800");
   forest::add_renderer(app, options.drawer);
   app.add_option("--screenshot", options.screenshot, "Write a PNG of the window once it is drawn, and end")
       ->check([](const std::string& name) {

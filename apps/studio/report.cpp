@@ -103,7 +103,7 @@ void report(Window& window) {
                   {"raster", place_of(window.raster())}};
     const Viewport::Figures& f = viewport->figures();
     print({{"event", "settled"},
-           {"view", Json::parse(scene::to_json(viewport->view()))},
+           {"view", Json::parse(viewport->text())},
            {"picture", picture},
            {"activity", activity},
            {"segments", f.segments},

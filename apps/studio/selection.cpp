@@ -157,6 +157,20 @@ nlohmann::ordered_json to_json(const scene::Forest& forest, const Selection& sel
   return json;
 }
 
+void add_marks(const RoundCone& branch, std::uint32_t entry, std::vector<frame::Overlay>& to) {
+  constexpr float step = 1.06f;  // between the radii of two marks
+  constexpr int most = 32;
+  const auto [thin, thick] = std::minmax(branch.radius_a, branch.radius_b);
+  const float ratio = thick / std::max(thin, .01f * thick + 1e-6f);
+  const int count = std::clamp(int(std::ceil(std::log(ratio) / std::log(step))), 1, most);
+  for (int i = 0; i < count; ++i) {
+    const float from = float(i) / float(count), end = float(i + 1) / float(count);
+    const auto radius = [&](float t) { return branch.radius_a + t * (branch.radius_b - branch.radius_a); };
+    to.push_back({branch.a + from * (branch.b - branch.a), branch.a + end * (branch.b - branch.a),
+                  std::max(radius(from), radius(end)), entry});
+  }
+}
+
 std::vector<frame::Overlay> highlight(const scene::Forest& forest, const Selection& selection) {
   const Subject s = subject(forest, selection);
   std::vector<frame::Overlay> marks;
@@ -164,13 +178,53 @@ std::vector<frame::Overlay> highlight(const scene::Forest& forest, const Selecti
     for (const std::uint32_t segment : selection.subarbor) {
       if ((s.section_of(segment) == selection.pick.section) != section || marks.size() >= most_marks)
         continue;
-      const RoundCone cone = scene::in_world(forest, s.index(), segment);
-      marks.push_back({cone.a, cone.b, 1.12f * std::max(cone.radius_a, cone.radius_b) + .05f, entry});
+      RoundCone cone = scene::in_world(forest, s.index(), segment);
+      cone.radius_a = 1.02f * cone.radius_a + .01f, cone.radius_b = 1.02f * cone.radius_b + .01f;
+      add_marks(cone, entry, marks);
     }
   };
   mark(true, scene::section_entry);
   mark(false, scene::highlight_entry);
   return marks;
+}
+
+std::optional<scene::Pick> pick_spine(scene::Skin& skin, const scene::Forest& forest,
+                                      const frame::Camera& camera, const frame::Viewport& viewport,
+                                      const Vec2& place, const std::function<bool(std::uint32_t)>& has_skin) {
+  constexpr float longest_spine = 4.f, reach = 1.f;  // µm; pixels that a spine is widened by
+  const Ray ray = ray_through(camera, viewport, place);
+  const auto pixels = [&](float depth) { return 1.f / camera.pixel_size(viewport.height, depth); };  // a µm
+  const Vec3 forward = -camera.axes().col(2);
+  std::optional<scene::Pick> nearest;
+  for (std::uint32_t i = 0; i < forest.instances().size(); ++i) {
+    const frame::Instance& instance = forest.instances()[i];
+    const scene::Neuron& neuron = forest.neurons()[instance.morphology];
+    if (!neuron.cluster_count || !has_skin(i)) continue;
+    const Quat turn(instance.qw, instance.qx, instance.qy, instance.qz);
+    const Vec3 at(instance.x, instance.y, instance.z);
+    const auto in_world = [&](const Vec3& p) -> Vec3 { return at + turn * p; };
+    const scene::Cluster& all = forest.clusters()[neuron.first_cluster];
+    const Vec3 to = in_world({all.x, all.y, all.z}) - ray.origin;
+    const float room = all.radius + longest_spine, along = to.dot(ray.direction);
+    if (pixels(std::max(camera.near, to.dot(forward) - room)) < scene::spines_begin ||
+        (to - along * ray.direction).squaredNorm() > room * room)
+      continue;
+    for (const scene::Spine& spine : skin.spines(instance.morphology)) {
+      const Vec3 tip = in_world(spine.tip), beside = tip - ray.origin;
+      const float depth = (tip - camera.eye).dot(forward);
+      if (depth < camera.near || pixels(depth) < scene::spines_begin ||
+          beside.cross(ray.direction).squaredNorm() > longest_spine * longest_spine)
+        continue;
+      const float wider = reach / pixels(depth);
+      const RoundCone neck{in_world(spine.base), tip, spine.neck + wider, spine.neck + wider},
+          head{tip, tip, spine.head + wider, spine.head + wider};
+      for (const RoundCone& part : {neck, head})
+        if (const auto t = intersect(ray, part); t && (!nearest || double(*t) < nearest->distance))
+          nearest = {i, neuron.first_segment + spine.segment,
+                     forest.section_of_segment()[neuron.first_original + spine.segment], double(*t)};
+    }
+  }
+  return nearest;
 }
 
 Sphere around(const scene::Forest& forest, const Selection& selection) {

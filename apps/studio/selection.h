@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,6 +14,7 @@
 #include "forest/core/bounds.h"
 #include "forest/frame/frame.h"
 #include "forest/scene/pick.h"
+#include "forest/scene/skin.h"
 #include "forest/scene/synapses.h"
 
 namespace forest::studio {
@@ -44,9 +47,18 @@ nlohmann::ordered_json to_json(const scene::Forest& forest, const Selection& sel
 std::vector<Fact> facts(const scene::Synapses& synapses, std::uint32_t synapse);
 nlohmann::ordered_json to_json(const scene::Synapses& synapses, std::uint32_t synapse);
 
+/// The section that a spine under a place of the picture stands on, where spines are drawn (scene/skin.h). As scene::pick has it.
+/// @param has_skin  whether an instance is drawn with one
+std::optional<scene::Pick> pick_spine(scene::Skin& skin, const scene::Forest& forest,
+                                      const frame::Camera& camera, const frame::Viewport& viewport,
+                                      const Vec2& place, const std::function<bool(std::uint32_t)>& has_skin);
+
 inline constexpr std::size_t most_marks = 50'000;  // capsules of a highlight; the section itself comes first
 
-/// Capsules a little thicker than the branches: the picked section as scene::section_entry, the rest as highlight_entry.
+/// Marks over a branch that taper as it does, in steps too small to be seen; each as wide as the branch there, or a little wider.
+/// @param entry  of the palette
+void add_marks(const RoundCone& branch, std::uint32_t entry, std::vector<frame::Overlay>& to);
+/// Marks a hair's breadth wider than the branches: the picked section as scene::section_entry, the rest as highlight_entry.
 std::vector<frame::Overlay> highlight(const scene::Forest& forest, const Selection& selection);
 /// A sphere around the subarbor, in the world.
 Sphere around(const scene::Forest& forest, const Selection& selection);

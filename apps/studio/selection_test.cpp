@@ -115,7 +115,7 @@ TEST_F(SelectionOfSample, HighlightHoldsTheBranchesAndTheSectionIsMarkedApart) {
   for (int i = 0; i < 50; ++i) {
     const Selection selection = select(forest, any());
     const auto marks = highlight(forest, selection);
-    ASSERT_EQ(marks.size(), selection.subarbor.size());
+    ASSERT_GE(marks.size(), selection.subarbor.size());
     const Sphere sphere = around(forest, selection);
     std::size_t section = 0;
     for (const frame::Overlay& mark : marks) {
@@ -125,11 +125,67 @@ TEST_F(SelectionOfSample, HighlightHoldsTheBranchesAndTheSectionIsMarkedApart) {
     }
     EXPECT_GE(section, 1u);
     const RoundCone picked = scene::in_world(forest, selection.pick.instance, selection.pick.segment);
+    // Of both ends of the branch: no thinner than it is there, and hardly thicker.
+    const auto as_wide = [](float mark, float branch) {
+      return mark > branch && mark < 1.1f * branch + .02f;
+    };
     EXPECT_TRUE(std::ranges::any_of(marks, [&](const frame::Overlay& mark) {
-      return mark.colour == scene::section_entry && mark.a == picked.a && mark.b == picked.b &&
-             mark.radius > std::max(picked.radius_a, picked.radius_b);
+      return mark.colour == scene::section_entry && mark.a == picked.a &&
+             as_wide(mark.radius, picked.radius_a);
+    }));
+    EXPECT_TRUE(std::ranges::any_of(marks, [&](const frame::Overlay& mark) {
+      return mark.colour == scene::section_entry && (mark.b - picked.b).norm() < 1e-3f &&
+             as_wide(mark.radius, picked.radius_b);
     }));
   }
+}
+
+TEST(Marks, TaperAsTheirBranchDoes) {
+  const RoundCone branch{{0, 0, 0}, {10, 0, 0}, 2.f, .5f};
+  std::vector<frame::Overlay> marks;
+  add_marks(branch, 7, marks);
+  ASSERT_GT(marks.size(), 5u);
+  EXPECT_EQ(marks.front().a, branch.a);
+  EXPECT_LT((marks.back().b - branch.b).norm(), 1e-4f);
+  for (std::size_t i = 0; i < marks.size(); ++i) {
+    EXPECT_EQ(marks[i].colour, 7u);
+    EXPECT_NEAR(marks[i].radius, 2.f - .15f * marks[i].a.x(), 1e-3f);
+    EXPECT_LT((marks[i].a - (i ? marks[i - 1].b : branch.a)).norm(), 1e-4f);  // without gaps
+  }
+  marks.clear();
+  add_marks({{0, 0, 0}, {1, 0, 0}, 1.f, 1.f}, 7, marks);
+  EXPECT_EQ(marks.size(), 1u);  // what does not taper is one
+}
+
+TEST_F(SelectionOfSample, ASpineIsItsSection) {
+  scene::Skin skin(forest);
+  std::size_t met = 0;
+  for (std::uint32_t i = 0; i < forest.instances().size() && met < 20; ++i) {
+    const std::uint32_t own = forest.instances()[i].morphology;
+    const scene::Neuron& neuron = forest.neurons()[own];
+    const auto& instance = forest.instances()[i];
+    const Quat turn(instance.qw, instance.qx, instance.qy, instance.qz);
+    const auto& spines = skin.spines(own);
+    if (spines.empty()) continue;
+    const scene::Spine& spine = spines[random.below(std::uint32_t(spines.size()))];
+    const Vec3 at(instance.x, instance.y, instance.z), tip = at + turn * spine.tip,
+                                                       away = (tip - at - turn * spine.base).normalized();
+    frame::Camera camera;
+    camera.target = tip, camera.eye = tip + 12.f * away, camera.up = away.unitOrthogonal();
+    const frame::Viewport viewport{1000, 700};
+    const auto all = [](std::uint32_t) { return true; };
+    const auto pick = pick_spine(skin, forest, camera, viewport, {500, 350}, all);
+    ASSERT_TRUE(pick);
+    if (pick->distance < 11.) continue;  // another one stands before it
+    ++met;
+    EXPECT_EQ(pick->instance, i);
+    EXPECT_EQ(pick->segment, neuron.first_segment + spine.segment);
+    EXPECT_EQ(pick->section, forest.section_of_segment()[neuron.first_original + spine.segment]);
+    EXPECT_FALSE(pick_spine(skin, forest, camera, viewport, {500, 350}, [](std::uint32_t) { return false; }));
+    camera.eye = tip + 300.f * away;  // too far for spines to be drawn
+    EXPECT_FALSE(pick_spine(skin, forest, camera, viewport, {500, 350}, all));
+  }
+  EXPECT_GT(met, 0u);
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include <nlohmann/json.hpp>
+
 #include "apps/studio/camera_control.h"
 
 namespace forest::studio {
@@ -164,15 +166,21 @@ constexpr Toggle toggle_table[] = {
     {"Depth", "Dim the rest", "The forest steps back while a branch is selected", "X",
      [](const S& s) { return s.dim; }, [](S& s, bool on) { s.dim = on; }},
     {"Shown", "Synapses", "Where their branches are in sight, when a file of synapses is open", "Y",
-     [](const S& s) { return s.view.synapses != scene::SynapseColour::none; },
+     [](const S& s) { return s.has_synapses && s.view.synapses != scene::SynapseColour::none; },
      [](S& s, bool on) {
        s.synapse_colour = synapse_colour(s);
        s.view.synapses = on ? s.synapse_colour : scene::SynapseColour::none;
-     }},
+     },
+     [](const S& s) { return s.has_synapses; }},
     {"Shown", "Skin", "Neurons near the eye have a smooth skin and spines, once the view stands still", "N",
-     [](const S& s) { return s.skin; }, [](S& s, bool on) { s.skin = on; }},
-    {"Shown", "Surfaces", "Of a cortex, when some are open", "U", [](const S& s) { return s.surfaces; },
-     [](S& s, bool on) { s.surfaces = on; }},
+     [](const S& s) { return s.skin && s.view.skin; },
+     [](S& s, bool on) {
+       s.skin = on;
+       s.view.skin |= on;
+     }},
+    {"Shown", "Surfaces", "Of a cortex, when some are open", "U",
+     [](const S& s) { return s.has_surfaces && s.surfaces; }, [](S& s, bool on) { s.surfaces = on; },
+     [](const S& s) { return s.has_surfaces; }},
     {"Shown", "Outline", "The column and the limits of its layers", "O", [](const S& s) { return s.outline; },
      [](S& s, bool on) { s.outline = on; }},
     {"Shown", "Legend", "What colours mean", "L", [](const S& s) { return s.legend; },
@@ -198,6 +206,19 @@ scene::View whole_view(const Settings& settings, const Vec3& middle) {
     view.plane = {.at = plane.origin, .normal = plane.normal, .opacity = settings.plane_opacity};
   }
   return view;
+}
+
+std::string text_of(const Settings& settings, const Vec3& middle) {
+  auto text = nlohmann::ordered_json::parse(scene::to_json(whole_view(settings, middle)));
+  // A view alone says only where none may be: most pictures show one to those that ask for it beside the view.
+  if (settings.skin && settings.view.skin) text["skin"] = true;
+  return text.dump();
+}
+
+bool asks_for_skin(const std::function<scene::View(const scene::View&)>& read) {
+  scene::View without;
+  without.skin = false;
+  return read(without).skin;
 }
 
 void set_view(Settings& s, const scene::View& view, const Vec3& middle) {

@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <span>
+#include <string>
 
 #include "forest/geometry/plane.h"
 #include "forest/scene/view.h"
@@ -31,6 +32,8 @@ struct Settings {
   bool surfaces = true;       // of a cortex, where some are open
   scene::SynapseColour synapse_colour = scene::SynapseColour::sign;  // while none are shown: the last one
   float surface_opacity = 1.f;
+  // What is open: nobody sets these.
+  bool has_synapses = false, has_surfaces = false;
 };
 
 /// Called by a panel with what a person did, which is done to the settings of that moment.
@@ -41,6 +44,11 @@ Plane plane_of(const Settings& settings, const Vec3& middle, const Vec3& pia = V
 
 /// The view as text has it: with the plane in it, where it is shown.
 scene::View whole_view(const Settings& settings, const Vec3& middle);
+/// That as one line of JSON, which says too that neurons near the eye have a skin where they do.
+std::string text_of(const Settings& settings, const Vec3& middle);
+/// Whether a text of a view says so.
+/// @param read  the view of that text, as far as it says nothing else that of its argument
+bool asks_for_skin(const std::function<scene::View(const scene::View&)>& read);
 /// From now on the settings show this view, and its plane or none.
 void set_view(Settings& settings, const scene::View& view, const Vec3& middle);
 
@@ -68,6 +76,7 @@ struct Toggle {
   const char *group, *name, *hint, *shortcut;
   bool (*value)(const Settings&);
   void (*set)(Settings&, bool);
+  bool (*usable)(const Settings&) = [](const Settings&) { return true; };  // there is something to show
 };
 
 std::span<const char* const> groups();  // in the order of the panel

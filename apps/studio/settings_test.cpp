@@ -18,6 +18,9 @@ TEST(Settings, SynapsesComeBackInTheColoursThatTheyHad) {
   const Toggle& synapses = named(toggles(), "Synapses");
   const Choice& colour = named(choices(), "Synapse colour");
   Settings s;
+  EXPECT_FALSE(synapses.value(s)) << "none are open";
+  EXPECT_FALSE(synapses.usable(s));
+  s.has_synapses = true;
   for (const int word : {1, 0}) {
     colour.set(s, word);
     EXPECT_TRUE(synapses.value(s));
@@ -28,6 +31,32 @@ TEST(Settings, SynapsesComeBackInTheColoursThatTheyHad) {
     EXPECT_EQ(colour.value(s), word);
     EXPECT_TRUE(synapses.value(s));
   }
+}
+
+TEST(Settings, WhatIsNotOpenIsNotTicked) {
+  Settings s;
+  const Toggle& surfaces = named(toggles(), "Surfaces");
+  EXPECT_FALSE(surfaces.value(s) || surfaces.usable(s));
+  s.has_surfaces = true;
+  EXPECT_TRUE(surfaces.value(s) && surfaces.usable(s));
+  EXPECT_TRUE(named(toggles(), "Outline").usable(s));
+}
+
+TEST(Settings, TheTextOfAViewHoldsItsSkin) {
+  Settings s;
+  const Toggle& skin = named(toggles(), "Skin");
+  const auto said = [&] {
+    return asks_for_skin([&](const scene::View& unless) {
+      return scene::parse_view(text_of(s, Vec3::Zero()), "text", Vec3::UnitY(), &unless);
+    });
+  };
+  EXPECT_FALSE(said());
+  skin.set(s, true);
+  EXPECT_TRUE(said());
+  s.view.skin = false;  // a view that forbids it
+  EXPECT_FALSE(said() || skin.value(s));
+  skin.set(s, true);
+  EXPECT_TRUE(said() && skin.value(s));
 }
 
 }  // namespace

@@ -48,31 +48,41 @@ bool says_nothing(const Appearance& a) {
   return a == bare;
 }
 
-void show_state(const State& state, const scene::Colouring& colouring, TargetRow& row) {
-  row.colour = colouring.palette[8u * state.colour_class + 4];
+void show_state(const State& state, TargetRow& row) {
   row.kind = state.kind;
   row.opacity = float(state.opacity) / 255.f;
   row.simulated = state.is(State::simulated);
 }
 
+// Colours of branches that are seen, in the order of the classes.
+void show_colours(std::uint32_t classes, const scene::Colouring& colouring, TargetRow& row) {
+  for (std::uint32_t c = 0; c < scene::colour_classes; ++c) {
+    if (!(classes >> c & 1) || colouring.gauged >> c & 1) continue;
+    const Vec3& colour = colouring.palette[8u * c + std::uint32_t(SectionKind::apical)];
+    if (std::ranges::find(row.colours, colour) == row.colours.end()) row.colours.push_back(colour);
+  }
+}
+
 void show_members(const circuit::Members& members, const scene::Colouring& colouring, TargetRow& row) {
   std::size_t visible = 0;
+  std::uint32_t classes = 0;  // bits of those that are seen
   const State* first = nullptr;
   for (const std::uint32_t i : members) {
     const State& state = colouring.states[i];
-    visible += state.is(State::visible);
+    if (state.is(State::visible)) ++visible, classes |= 1u << state.colour_class;
     if (!first || (!first->is(State::visible) && state.is(State::visible))) first = &state;
   }
   row.count = members.size();
   row.seen = visible == 0                ? TargetRow::Seen::none
              : visible == members.size() ? TargetRow::Seen::all
                                          : TargetRow::Seen::some;
-  if (first) show_state(*first, colouring, row);
+  show_colours(classes, colouring, row);
+  if (first) show_state(*first, row);
 }
 
 TargetRow row_of(const scene::Targets& targets, const scene::Colouring& colouring, const std::string& name,
                  const std::string& origin) {
-  TargetRow row{.who = named(name), .title = name, .origin = origin, .problem = ""};
+  TargetRow row{.who = named(name), .title = name, .origin = origin, .colours = {}, .problem = ""};
   try {
     show_members(targets.find(name), colouring, row);
   } catch (const Error& error) {
@@ -82,7 +92,7 @@ TargetRow row_of(const scene::Targets& targets, const scene::Colouring& colourin
 }
 
 TargetRow row_of(const scene::Branch& branch, const scene::Colouring& colouring) {
-  TargetRow row{.who = {}, .title = "", .origin = "selection", .problem = ""};
+  TargetRow row{.who = {}, .title = "", .origin = "selection", .colours = {}, .problem = ""};
   row.who.branch = branch;
   const bool whole = branch.section == scene::soma_section;
   row.title = whole ? fmt::format("Neuron {}", branch.neuron)
@@ -92,7 +102,8 @@ TargetRow row_of(const scene::Branch& branch, const scene::Colouring& colouring)
     if (part.instance == branch.neuron && part.section == branch.section) state = part.state;
   row.count = 1;
   row.seen = state.is(State::visible) ? TargetRow::Seen::all : TargetRow::Seen::none;
-  show_state(state, colouring, row);
+  if (row.seen == TargetRow::Seen::all) show_colours(1u << state.colour_class, colouring, row);
+  show_state(state, row);
   return row;
 }
 
@@ -145,6 +156,20 @@ void change_target(scene::View& view, const Appearance& who, const Appearance& w
   if (what.opacity) last.opacity = what.opacity;
   if (what.colour) last.colour = what.colour;
   if (what.colour_by) last.colour_by = what.colour_by;
+}
+
+void show_only(scene::View& view, const Appearance& all, const Appearance& who) {
+  Appearance hidden, seen;
+  hidden.visible = false, seen.visible = true;
+  for (Appearance& a : view.targets) a.visible.reset();
+  std::erase_if(view.targets, says_nothing);
+  change_target(view, all, hidden);
+  change_target(view, who, seen);
+}
+
+void show_all(scene::View& view) {
+  for (Appearance& a : view.targets) a.visible.reset();
+  std::erase_if(view.targets, says_nothing);
 }
 
 std::span<const TargetColour> target_colours() { return colour_table; }

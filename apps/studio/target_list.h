@@ -19,8 +19,9 @@ struct TargetRow {
   std::string title, origin;
   std::size_t count = 0;  // neurons
   Seen seen = Seen::none;
+  // Of apical dendrites, linear light, each once; none where colours change along branches.
+  std::vector<Vec3> colours;
   // Of its first neuron:
-  Vec3 colour = Vec3::Zero();  // of apical dendrites, linear light
   frame::Kind kind = frame::Kind::any;
   float opacity = 1.f;
   bool simulated = true;
@@ -36,6 +37,11 @@ std::vector<TargetRow> target_rows(const scene::Targets& targets, const scene::V
 /// @param own_colour  false: what was said of its colour is forgotten
 void change_target(scene::View& view, const scene::Appearance& who, const scene::Appearance& what,
                    bool own_colour = true);
+
+/// That alone is shown of now on, and `all` else hidden.
+void show_only(scene::View& view, const scene::Appearance& all, const scene::Appearance& who);
+/// Nothing is hidden any more; what else was said of targets stays.
+void show_all(scene::View& view);
 
 /// Words that colour a target: those of a view's way of colouring, or one colour.
 struct TargetColour {

@@ -73,14 +73,50 @@ TEST(TargetList, ANodeSetMayBeNamedAsAllAre) {
 
 TEST(TargetList, ColoursAreForgottenWhenTheViewsOwnIsWanted) {
   Fixture f;
-  const Vec3 before = f.row("second").colour;
+  const auto before = f.row("second").colours;
   Appearance orange;
   orange.colour = 0xE69F00;
   f.set("second", orange);
-  EXPECT_EQ(f.row("second").colour, scene::light_of(0xE69F00));
+  EXPECT_EQ(f.row("second").colours, std::vector{scene::light_of(0xE69F00)});
   f.set("second", {}, false);
-  EXPECT_EQ(f.row("second").colour, before);
+  EXPECT_EQ(f.row("second").colours, before);
   EXPECT_TRUE(f.view.targets.empty());
+}
+
+TEST(TargetList, SeveralColoursAreAllTold) {
+  Fixture f;
+  f.view.colour_by = scene::ColourBy::layer;
+  const auto upper = f.row("upper").colours, lower = f.row("lower").colours;
+  ASSERT_EQ(upper.size(), 1u);
+  ASSERT_EQ(lower.size(), 1u);
+  const auto all = f.row("all").colours;
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_NE(std::ranges::find(all, upper[0]), all.end());
+  EXPECT_NE(std::ranges::find(all, lower[0]), all.end());
+  f.set("lower", visible(false));
+  EXPECT_EQ(f.row("all").colours, upper);  // of those that are seen
+  EXPECT_TRUE(f.row("lower").colours.empty());
+  f.view.colour_by = scene::ColourBy::radius;
+  EXPECT_TRUE(f.row("upper").colours.empty());  // they change along its branches
+}
+
+TEST(TargetList, OneIsShownAloneAndThenAllAreAgain) {
+  Fixture f;
+  Appearance clear;
+  clear.opacity = .5f;
+  f.set("second", clear);
+  f.set("first", visible(false));
+  Appearance all, who;
+  all.name = "all", who.name = "first";
+  show_only(f.view, all, who);
+  EXPECT_EQ(f.row("first").seen, Seen::all);
+  EXPECT_EQ(f.row("second").seen, Seen::none);
+  who = {}, who.branch = scene::Branch{3, scene::soma_section};
+  show_only(f.view, all, who);
+  EXPECT_EQ(f.row("all").seen, Seen::some);
+  show_all(f.view);
+  EXPECT_EQ(f.row("all").seen, Seen::all);
+  EXPECT_NEAR(f.row("second").opacity, .5f, .01f);  // what else was said stays
 }
 
 TEST(TargetList, ShowsTheSelectionExpressionsAndWhatIsWrong) {

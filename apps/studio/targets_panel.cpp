@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/studio/targets_panel.h"
 
+#include <QAction>
 #include <QCheckBox>
 #include <QColorDialog>
 #include <QComboBox>
@@ -9,6 +10,7 @@
 #include <QKeyEvent>
 #include <QLabel>
 #include <QLineEdit>
+#include <QMouseEvent>
 #include <QPainter>
 #include <QShortcut>
 #include <QSignalBlocker>
@@ -25,15 +27,27 @@ namespace {
 
 constexpr int rows_seen = 6;  // at least, without scrolling
 
-QIcon swatch(const QColor& colour) {
+// A dot, or of several colours a strip; of none an empty place, so that rows stay as they are.
+QIcon swatch(const std::vector<QColor>& colours) {
   QPixmap picture(24, 24);
   picture.fill(Qt::transparent);
   QPainter painter(&picture);
   painter.setRenderHint(QPainter::Antialiasing);
   painter.setPen(Qt::NoPen);
-  painter.setBrush(colour);
-  painter.drawEllipse(4, 4, 16, 16);
+  const qreal width = 20. / std::max(1., qreal(colours.size()));
+  for (std::size_t i = 0; i < colours.size(); ++i) {
+    painter.setBrush(colours[i]);
+    if (colours.size() == 1)
+      painter.drawEllipse(4, 4, 16, 16);
+    else
+      painter.drawRect(QRectF(2. + width * qreal(i), 6., width, 12.));
+  }
   return QIcon(picture);
+}
+QIcon swatch(const std::vector<Vec3>& colours) {
+  std::vector<QColor> seen;
+  for (const Vec3& colour : colours) seen.push_back(to_screen(colour));
+  return swatch(seen);
 }
 
 // Space ticks the box of a row, whatever else it does in the window.
@@ -73,8 +87,10 @@ TargetsPanel::TargetsPanel(Changes changes, QWidget* parent) : QWidget(parent), 
   column->setContentsMargins(6, 6, 6, 8);
   column->setSpacing(4);
 
-  list_ = named(new QTreeWidget(this), "Targets",
-                "Sets of neurons: the box shows or hides one, Space does so too", "Alt+T");
+  list_ =
+      named(new QTreeWidget(this), "Targets",
+            "Sets of neurons: the box shows or hides one, Space does so too; Alt and a click shows one alone",
+            "Alt+T");
   list_->installEventFilter(new KeepsSpace(list_));
   list_->setColumnCount(2);
   list_->setHeaderHidden(true);
@@ -87,6 +103,17 @@ TargetsPanel::TargetsPanel(Changes changes, QWidget* parent) : QWidget(parent), 
   list_->header()->setStretchLastSection(false);
   list_->header()->setSectionResizeMode(0, QHeaderView::Stretch);
   list_->header()->setSectionResizeMode(1, QHeaderView::ResizeToContents);
+  list_->viewport()->installEventFilter(this);
+  list_->setContextMenuPolicy(Qt::ActionsContextMenu);
+  const auto act = [this](const QString& name, const char* key, const std::function<void()>& run) {
+    auto* action = new QAction(name, list_);
+    action->setShortcut(QKeySequence(key));
+    action->setShortcutContext(Qt::WidgetShortcut);
+    connect(action, &QAction::triggered, this, run);
+    list_->addAction(action);
+  };
+  act(tr("Only this"), "Ctrl+Return", [this] { show_only_chosen(); });
+  act(tr("Show all again"), "Ctrl+Shift+Return", [this] { changes_.show_all(); });
   column->addWidget(list_, 1);
   connect(list_, &QTreeWidget::itemChanged, this, [this](QTreeWidgetItem* item, int) {
     if (quiet_) return;
@@ -129,7 +156,7 @@ TargetsPanel::TargetsPanel(Changes changes, QWidget* parent) : QWidget(parent), 
   form->setColumnStretch(1, 1);
   colour_ = named(new QComboBox(this), "Colour of the target", "One colour, or what colours mean", "Alt+C");
   for (const TargetColour& colour : target_colours())
-    colour_->addItem(colour.rgb ? swatch(QColor::fromRgb(*colour.rgb)) : QIcon(), colour.name);
+    colour_->addItem(colour.rgb ? swatch(std::vector{QColor::fromRgb(*colour.rgb)}) : QIcon(), colour.name);
   colour_->addItem(tr("Another…"));
   connect(colour_, &QComboBox::activated, this, [this](int index) {
     scene::Appearance what;
@@ -185,6 +212,27 @@ TargetsPanel::TargetsPanel(Changes changes, QWidget* parent) : QWidget(parent), 
   show_chosen();
 }
 
+// Alt and a click: that row alone, whatever part of it is met.
+bool TargetsPanel::eventFilter(QObject* of, QEvent* event) {
+  const auto type = event->type();
+  if (type != QEvent::MouseButtonPress && type != QEvent::MouseButtonRelease)
+    return QWidget::eventFilter(of, event);
+  const auto* mouse = static_cast<QMouseEvent*>(event);
+  if (mouse->button() != Qt::LeftButton || !(mouse->modifiers() & Qt::AltModifier))
+    return QWidget::eventFilter(of, event);
+  if (QTreeWidgetItem* item = list_->itemAt(mouse->position().toPoint());
+      item && type == QEvent::MouseButtonPress) {
+    list_->setCurrentItem(item);
+    show_only_chosen();
+  }
+  return true;
+}
+
+void TargetsPanel::show_only_chosen() {
+  if (const TargetRow* row = chosen(); row && row->problem.empty() && row->count)
+    changes_.only(rows_.back().who, scene::Appearance(row->who));  // the last row is that of all
+}
+
 const TargetRow* TargetsPanel::chosen() const {
   const int row = list_->indexOfTopLevelItem(list_->currentItem());
   return row >= 0 && std::size_t(row) < rows_.size() ? &rows_[std::size_t(row)] : nullptr;
@@ -211,8 +259,7 @@ void TargetsPanel::show_rows(std::vector<TargetRow> rows) {
     item->setText(1, row.problem.empty() ? QLocale().toString(qulonglong(row.count)) : "?");
     item->setTextAlignment(1, Qt::AlignRight | Qt::AlignVCenter);
     item->setForeground(1, QColor(140, 153, 172));
-    item->setIcon(0,
-                  row.count && row.seen != TargetRow::Seen::none ? swatch(to_screen(row.colour)) : QIcon());
+    item->setIcon(0, swatch(row.colours));
     item->setFlags(row.problem.empty() && row.count
                        ? Qt::ItemIsEnabled | Qt::ItemIsSelectable | Qt::ItemIsUserCheckable
                        : Qt::ItemIsSelectable);
@@ -249,10 +296,11 @@ void TargetsPanel::show_chosen() {
   kind_->setCurrentIndex(int(row->kind));
   opacity_->setValue(int(std::lround(100.f * row->opacity)));
   simulated_->setChecked(row->simulated);
-  const QColor seen = to_screen(row->colour);
+  const QColor seen = row->colours.size() == 1 ? to_screen(row->colours.front()) : QColor();
   int word = 0;
   for (std::size_t i = 0; i < target_colours().size(); ++i)
-    if (const auto& rgb = target_colours()[i].rgb; rgb && QColor::fromRgb(*rgb).rgb() == seen.rgb())
+    if (const auto& rgb = target_colours()[i].rgb;
+        rgb && seen.isValid() && QColor::fromRgb(*rgb).rgb() == seen.rgb())
       word = int(i);
   colour_->setCurrentIndex(word);
 }

@@ -24,6 +24,10 @@ class TargetsPanel final : public QWidget {
     std::function<void(const scene::Appearance& who, const scene::Appearance& what, bool own_colour)> change;
     /// A person names a new one; returns a sentence when there is none.
     std::function<QString(const QString& expression)> add;
+    /// A person wants one alone, and nothing else of `all`.
+    std::function<void(const scene::Appearance& all, const scene::Appearance& who)> only;
+    /// A person wants to see everything again.
+    std::function<void()> show_all;
   };
   explicit TargetsPanel(Changes changes, QWidget* parent = nullptr);
   /// Shows them, telling nobody. The row that is chosen stays so.
@@ -32,7 +36,9 @@ class TargetsPanel final : public QWidget {
   void rest(const QString& word);
 
  private:
+  bool eventFilter(QObject* of, QEvent* event) override;
   const TargetRow* chosen() const;
+  void show_only_chosen();
   void show_chosen();
   void say(const scene::Appearance& what, bool own_colour = true);
 

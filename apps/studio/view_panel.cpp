@@ -167,7 +167,10 @@ QWidget* ViewPanel::field(const Toggle& toggle) {
   box->setToolTip(with_shortcut(toggle.hint, toggle.shortcut));
   box->setFocusPolicy(Qt::TabFocus);
   connect(box, &QCheckBox::clicked, this, [this, &toggle](bool on) { set(toggle, on); });
-  refresh_.push_back([this, box, &toggle] { box->setChecked(toggle.value(settings_)); });
+  refresh_.push_back([this, box, &toggle] {
+    box->setChecked(toggle.value(settings_));
+    box->setEnabled(toggle.usable(settings_));
+  });
   return box;
 }
 

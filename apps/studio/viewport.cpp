@@ -28,6 +28,9 @@ constexpr float turn_pixels_a_second = 400.f;    // of the arrow keys
 constexpr std::size_t moving_synapses = 60'000;  // drawn at most while the view moves
 constexpr std::size_t still_pieces = 24;         // of skin, made between two looks at the mouse
 constexpr float reach = 3.f;                     // a click so many pixels beside a branch means it
+constexpr float through = .3f;    // what nothing shall hide is drawn at this share of its distance
+constexpr float rim = 1.8f;       // points of a mark beside the branch that it is around
+constexpr qint64 one_turn = 500;  // milliseconds between steps of the wheel that are one movement
 
 struct FlightKey {
   int key;
@@ -44,16 +47,50 @@ bool is_flight_key(int key) {
   return std::ranges::any_of(flight_keys, [key](const FlightKey& k) { return k.key == key; });
 }
 
+float depth_of(const frame::Overlay& mark, const frame::Camera& camera) {
+  return std::max(0.f, (.5f * (mark.a + mark.b) - camera.eye).dot(-camera.axes().col(2)));
+}
+
+// As large in the picture, at a share of its distance.
+void move_along_sight(frame::Overlay& mark, const frame::Camera& camera, float share) {
+  if (camera.orthographic()) {
+    const Vec3 way = (share - 1.f) * depth_of(mark, camera) * -camera.axes().col(2);
+    mark.a += way, mark.b += way;
+    return;
+  }
+  mark.a = camera.eye + share * (mark.a - camera.eye), mark.b = camera.eye + share * (mark.b - camera.eye);
+  mark.radius *= share;
+}
+
+// Nearer than all tissue, and not so near that it is cut.
+float share_in_front(float depth, const frame::Camera& camera) {
+  return std::min(1.f, std::max(through, 1.05f * camera.near / std::max(depth, 1e-3f)));
+}
+
 // Marks that can be seen however far they are: no thinner than a few pixels, a section wider than its subarbor.
 std::vector<frame::Overlay> visible(std::vector<frame::Overlay> marks, const frame::Camera& camera,
                                     float height) {
-  const Vec3 forward = -camera.axes().col(2);
-  for (frame::Overlay& mark : marks) {
-    const float depth = std::max(0.f, (.5f * (mark.a + mark.b) - camera.eye).dot(forward));
-    mark.radius = std::max(
-        mark.radius, (mark.colour == scene::section_entry ? 1.9f : 1.3f) * camera.pixel_size(height, depth));
-  }
+  for (frame::Overlay& mark : marks)
+    mark.radius = std::max(mark.radius, (mark.colour == scene::section_entry ? 1.9f : 1.3f) *
+                                            camera.pixel_size(height, depth_of(mark, camera)));
   return marks;
+}
+
+// A rim around the picked section, which leaves the colours of its values alone: marks that are wider, and lie behind it.
+// @param front  the section itself is drawn before all tissue
+std::vector<frame::Overlay> rims(const std::vector<frame::Overlay>& marks, const frame::Camera& camera,
+                                 float height, float ratio, bool front) {
+  std::vector<frame::Overlay> all;
+  for (frame::Overlay mark : marks) {
+    const float depth = depth_of(mark, camera);
+    if (mark.colour != scene::section_entry || depth < camera.near) continue;
+    const float pixel = camera.pixel_size(height, depth);
+    mark.radius = std::max(mark.radius, pixel) + rim * ratio * pixel;
+    move_along_sight(mark, camera,
+                     (front ? share_in_front(depth, camera) : 1.f) * (1.f + 2.5f * mark.radius / depth));
+    all.push_back(mark);
+  }
+  return all;
 }
 
 Vec2 vec(const QPointF& p) { return {float(p.x()), float(p.y())}; }
@@ -70,6 +107,9 @@ Viewport::Viewport(scene::Forest forest, const scene::View& view, circuit::NodeS
       colouring_(scene::colour(targets_, view)),
       outline_(scene::outline(forest_)),
       pia_(scene::towards_pia(forest_)),
+      has_axons_(std::ranges::any_of(
+          forest_.sections(), [](std::uint32_t kind) { return SectionKind(kind) == SectionKind::axon; },
+          &scene::SectionFacts::kind)),
       dressing_(forest_),
       drawer_(drawer) {
   set_view(settings_, view, forest_.soma_bounds().centre());
@@ -93,6 +133,8 @@ Viewport::~Viewport() {
 }
 
 scene::View Viewport::view() const { return whole_view(settings_, forest_.soma_bounds().centre()); }
+
+std::string Viewport::text() const { return text_of(settings_, forest_.soma_bounds().centre()); }
 
 void Viewport::change(const Settings& settings) {
   const scene::View& old = settings_.view;
@@ -134,7 +176,9 @@ void Viewport::fly_along(std::vector<scene::View> views) {
   }
   const frame::Camera end = views.back().camera;
   const float seconds = key_seconds * float(std::max<std::size_t>(1, views.size() - 1));
-  glide_ = Glide{scene::CameraPath(std::move(views)), end, seconds, true};
+  glide_ =
+      Glide{.path = scene::CameraPath(views), .end = end, .seconds = seconds, .whole = true, .views = {}};
+  glide_->views = std::move(views);
   glide_->clock.start();
   touch();
 }
@@ -164,11 +208,20 @@ void Viewport::select(const std::optional<scene::Pick>& pick, std::optional<std:
   Q_EMIT selected();
 }
 
-std::optional<scene::Pick> Viewport::pick(const QPointF& place) const {
+std::optional<scene::Pick> Viewport::pick(const QPointF& place) {
   const frame::Camera& camera = settings_.view.camera;
   const Vec2 at = vec(place) + Vec2(.5f, .5f);
-  const auto exact =
+  auto exact =
       scene::pick(forest_, camera, in_points(), at, .5f / float(devicePixelRatioF()), colouring_.shown());
+  if (figures_.triangles) {
+    const auto has_skin = [&](std::uint32_t i) {
+      const frame::State& state = colouring_.states[i];
+      return state.is(frame::State::visible) &&
+             (state.kind == frame::Kind::skin || (state.kind == frame::Kind::any && settings_.skin));
+    };
+    const auto spine = pick_spine(dressing_.skin, forest_, camera, in_points(), at, has_skin);
+    if (spine && (!exact || spine->distance < exact->distance)) exact = spine;
+  }
   return exact ? exact : scene::pick(forest_, camera, in_points(), at, reach, colouring_.shown());
 }
 
@@ -189,12 +242,16 @@ void Viewport::show(scene::Synapses synapses) {
   if (selected_synapse_) select(std::nullopt);
   dressing_.chosen = {};
   dressing_.synapses.emplace(std::move(synapses));
+  settings_.has_synapses = true;
   touch();
+  Q_EMIT changed();
 }
 
 void Viewport::show(scene::Surfaces surfaces) {
   dressing_.surfaces = std::move(surfaces);
+  settings_.has_surfaces = !dressing_.surfaces.empty();
   touch();
+  Q_EMIT changed();
 }
 
 void Viewport::play(scene::Playback playback) {
@@ -341,18 +398,7 @@ void Viewport::advance(float seconds) {
                                       : begin + std::fmod(next - begin, std::max(length, step / 1e6)));
     window_ = step;
   }
-  if (glide_) {
-    const float t = float(glide_->clock.elapsed()) / (1000.f * glide_->seconds);
-    const bool there = t >= 1.f;
-    Settings next = settings_;
-    if (glide_->whole)
-      set_view(next, glide_->path.at(std::min(t, 1.f)), forest_.soma_bounds().centre()),
-          next.view.activity = settings_.view.activity;
-    else
-      next.view.camera = glide_->path.at(std::min(t, 1.f)).camera;
-    if (there) next.view.camera = glide_->end, glide_.reset();
-    change(next);
-  }
+  if (glide_) glide_on();
   if (!flies()) return;
   Vec3 way = Vec3::Zero();
   Vec2 turn = Vec2::Zero();
@@ -360,6 +406,64 @@ void Viewport::advance(float seconds) {
     if (held_.contains(k.key)) way += k.way, turn += k.turn;
   const float speed = settings_.speed * (fast_ ? 4.f : 1.f);
   set_camera(fly(look(settings_.view.camera, turn_pixels_a_second * seconds * turn), speed * seconds * way));
+}
+
+void Viewport::glide_on() {
+  const float t = float(glide_->clock.elapsed()) / (1000.f * glide_->seconds);
+  Settings next = settings_;
+  if (glide_->whole)
+    set_view(next, glide_->path.at(std::min(t, 1.f)), forest_.soma_bounds().centre()),
+        next.view.activity = settings_.view.activity;
+  else
+    next.view.camera = glide_->path.at(std::min(t, 1.f)).camera;
+  if (t < 1.f) return change(next);
+  next.view.camera = glide_->end;
+  const Glide there = std::move(*glide_);
+  glide_.reset();
+  change(next);
+  if (!loop_ || there.views.empty()) return;
+  // A path that ends where it began needs no way back.
+  const frame::Camera& first = there.views.front().camera;
+  if (there.returns || first == there.end) return fly_along(there.views);
+  glide_ = Glide{.path = scene::CameraPath({there.views.back(), there.views.front()}),
+                 .end = first,
+                 .seconds = key_seconds,
+                 .whole = true,
+                 .views = there.views,
+                 .returns = true};
+  glide_->clock.start();
+}
+
+std::vector<frame::Overlay> Viewport::in_front(const scene::View& view, const scene::Eye& eye,
+                                               const scene::Chooser::Painter& painter) const {
+  const std::uint32_t instance = selection_->pick.instance;
+  const frame::State& state = colouring_.states[instance];
+  constexpr frame::Kind as_branches[] = {frame::Kind::any, frame::Kind::lines, frame::Kind::capsules};
+  if (figures_.triangles || state.opacity < 255 || !state.is(frame::State::visible) ||
+      state.is(frame::State::parted) || std::ranges::find(as_branches, state.kind) == std::end(as_branches))
+    return {};
+  const scene::Neuron& neuron = forest_.neurons()[forest_.instances()[instance].morphology];
+  scene::Cut branches;  // a segment each
+  for (std::uint32_t i = 0; i < neuron.original_count; ++i)
+    branches.dots.push_back({.instance = instance,
+                             .first_segment = neuron.first_segment + i,
+                             .drawn = 1,
+                             .state = 0,
+                             .x = 0.f,
+                             .y = 0.f,
+                             .z = 0.f,
+                             .radius = 0.f});
+  painter(branches, eye);
+  if (!branches.entries) return {};
+  std::vector<frame::Overlay> marks;
+  for (std::uint32_t i = 0; i < neuron.original_count && marks.size() < most_marks; ++i)
+    add_marks(scene::in_world(forest_, instance, neuron.first_segment + i), branches.entries->dots[i], marks);
+  std::erase_if(marks, [&](frame::Overlay& mark) {
+    const float depth = depth_of(mark, view.camera);
+    move_along_sight(mark, view.camera, share_in_front(depth, view.camera));
+    return depth < view.camera.near;
+  });
+  return marks;
 }
 
 void Viewport::draw_part(const scene::View& of, std::uint32_t first, std::uint32_t last,
@@ -378,13 +482,20 @@ void Viewport::draw_part(const scene::View& of, std::uint32_t first, std::uint32
     };
   else if (colouring_.gauge)
     painter = [this](scene::Cut& cut, const scene::Eye&) { scene::paint(forest_, colouring_, cut); };
-  if (first == 0 && !layered(view))
-    chooser_.choose(scene::Eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h)),
-                    colouring_.shown(), painter);
-  std::vector<frame::Overlay> overlays = visible(highlight_, view.camera, float(h));
-  // What a branch does is seen beside the mark of the picked section, not under that of its subarbor.
-  if (playback_)
-    std::erase_if(overlays, [](const frame::Overlay& o) { return o.colour != scene::section_entry; });
+  const scene::Eye eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h));
+  std::vector<frame::Overlay> overlays;
+  if (selection_ && coloured) {
+    // What a branch does is seen within the rim of the picked section, and not under marks.
+    if (settings_.dim) overlays = in_front(view, eye, painter);
+    const auto around =
+        rims(highlight_, view.camera, float(h), float(devicePixelRatioF()), !overlays.empty());
+    overlays.insert(overlays.end(), around.begin(), around.end());
+  } else {
+    overlays = visible(highlight_, view.camera, float(h));
+    if (playback_)
+      std::erase_if(overlays, [](const frame::Overlay& o) { return o.colour != scene::section_entry; });
+  }
+  if (first == 0 && !layered(view)) chooser_.choose(eye, colouring_.shown(), painter);
   if (settings_.outline) overlays.insert(overlays.end(), outline_.begin(), outline_.end());
   scene::Colouring colouring = colouring_;
   if (spikes_alone) {
@@ -392,7 +503,7 @@ void Viewport::draw_part(const scene::View& of, std::uint32_t first, std::uint32
     overlays.insert(overlays.end(), flashes.begin(), flashes.end());
     make_quiet(colouring.palette, view.background);
   }
-  mark_selection(colouring.palette, view.background, selection_ && settings_.dim);
+  mark_selection(colouring.palette, view.background, selection_ && settings_.dim, coloured);
   std::optional<frame::Glass> glass;
   if (const auto plane = this->view().plane) {
     glass = scene::plane_glass(forest_, *plane, view.background);
@@ -405,8 +516,8 @@ void Viewport::draw_part(const scene::View& of, std::uint32_t first, std::uint32
   figures_.synapses = figures_.triangles = 0;
   Foveated::Dresser dress;
   if (dressing_.wanted(view, colouring))
-    dress = [&](frame::Frame& to, const scene::Cut& cut, const scene::Eye& eye) {
-      dressing_.put_on(to, view, cut, eye, colouring, coloured, painter, limits);
+    dress = [&](frame::Frame& to, const scene::Cut& cut, const scene::Eye& of_layer) {
+      dressing_.put_on(to, view, cut, of_layer, colouring, coloured, painter, limits);
       figures_.synapses = dressing_.chosen.balls.size(), figures_.triangles = dressing_.skins.triangles;
     };
   if (layered(view)) {
@@ -420,9 +531,7 @@ void Viewport::draw_part(const scene::View& of, std::uint32_t first, std::uint32
   frame::Frame frame = scene::compose(forest_, view, colouring, chooser_.cut(), w, h, overlays);
   frame.glass = glass;
   chooser_.complete(frame);
-  if (dress)
-    dress(frame, chooser_.cut(),
-          scene::Eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h)));
+  if (dress) dress(frame, chooser_.cut(), eye);
   frame.first_subframe = first, frame.last_subframe = last;
   renderer_->draw(frame);
   chooser_.remember(renderer_->seen(), renderer_->reached());
@@ -513,8 +622,22 @@ void Viewport::paint(const frame::Image& drawn, float softness) {
 
 std::vector<scene::LegendEntry> Viewport::legend() const {
   std::vector<scene::LegendEntry> entries = colouring_.legend;
+  // By type an axon has the colour of its neuron, but cooler and dimmer: so it is told, of the first few.
+  scene::LegendEntry axons{"axons: dimmer and cooler", {}};
+  constexpr std::size_t few = 4;
+  const frame::Palette& palette = colouring_.palette;
+  for (std::size_t i = 0; i < std::min(entries.size(), few) && !entries[i].colours.empty(); ++i)
+    for (std::uint32_t c = 0; c < scene::colour_classes; ++c)
+      if (palette[8 * c + std::uint32_t(SectionKind::apical)] == entries[i].colours.front()) {
+        axons.colours.push_back(palette[8 * c + std::uint32_t(SectionKind::axon)]);
+        break;
+      }
+  if (has_axons_ && settings_.view.colour_by == scene::ColourBy::type && !axons.colours.empty())
+    entries.push_back(axons);
   if (figures_.synapses && settings_.view.synapses == scene::SynapseColour::sign)
     std::ranges::move(scene::synapse_legend(settings_.view.background), std::back_inserter(entries));
+  if (figures_.synapses && settings_.view.synapses == scene::SynapseColour::target)
+    entries.push_back({"synapses: as the neuron that they are on", {}});
   return entries;
 }
 
@@ -526,8 +649,8 @@ void Viewport::annotate() {
   painter.setRenderHint(QPainter::Antialiasing);
   const Ink ink = ink_on(settings_.view.background);
   if (settings_.scale) {
-    paint_scale(painter, rect(), settings_.view.camera, ink);
-    paint_directions(painter, rect(), settings_.view.camera, ink, pia_);
+    const QRectF taken = paint_scale(painter, rect(), settings_.view.camera, ink);
+    paint_directions(painter, rect(), settings_.view.camera, ink, pia_, taken);
   }
   if (settings_.legend) {
     Explanations explanations(painter, rect(), ink);
@@ -588,8 +711,44 @@ void Viewport::mouseDoubleClickEvent(QMouseEvent* event) {
 void Viewport::wheelEvent(QWheelEvent* event) {
   const float steps = float(event->angleDelta().y()) / 120.f;
   glide_.reset();
-  set_camera(dolly(settings_.view.camera, in_points(), vec(event->position()), std::pow(.85f, steps)));
+  frame::Camera camera = settings_.view.camera;
+  Vec2 pixel = vec(event->position());
+  if (const auto goal = goal_under(event->position())) {
+    const Vec3 seen = project(camera, in_points(), *goal);
+    pixel = seen.head<2>(), camera = focused(camera, seen.z());
+  }
+  set_camera(dolly(camera, in_points(), pixel, std::pow(.85f, steps)));
   event->accept();
+}
+
+// Step after step towards the same thing: it stays under the mouse however thin it is, and whatever else comes in sight.
+std::optional<Vec3> Viewport::goal_under(const QPointF& place) {
+  const frame::Camera& camera = settings_.view.camera;
+  const auto depth = [&](const Vec3& p) { return (p - camera.eye).dot(-camera.axes().col(2)); };
+  if (approach_ && approach_->place == place && approach_->clock.elapsed() < one_turn &&
+      depth(approach_->goal) > 4.f * shortest) {
+    approach_->clock.start();
+    return approach_->goal;
+  }
+  approach_.reset();
+  const auto found = pick(place);
+  if (!found) return std::nullopt;
+  const Ray ray = ray_through(camera, in_points(), vec(place) + Vec2(.5f, .5f));
+  Vec3 goal = ray.origin + float(found->distance) * ray.direction;
+  // A branch that the mouse misses by a little would be missed by more and more.
+  const RoundCone branch = scene::in_world(forest_, found->instance, found->segment);
+  const Vec3 way = branch.b - branch.a, across = way - way.dot(ray.direction) * ray.direction,
+             from = ray.origin - branch.a;
+  const float along =
+      across.squaredNorm() > 0.f ? std::clamp(from.dot(across) / across.squaredNorm(), 0.f, 1.f) : 0.f;
+  const Vec3 axis = branch.a + along * way;
+  const float off = (axis - ray.origin).cross(ray.direction).norm(),
+              radius = branch.radius_a + along * (branch.radius_b - branch.radius_a);
+  if (off > radius && off < radius + reach * camera.pixel_size(float(height()), depth(axis))) goal = axis;
+  if (!(depth(goal) > 0.f)) return std::nullopt;
+  approach_ = Approach{place, goal};
+  approach_->clock.start();
+  return goal;
 }
 
 void Viewport::keyPressEvent(QKeyEvent* event) {

@@ -39,6 +39,7 @@ class Viewport final : public QOpenGLWidget {
   const scene::Colouring& colouring() const { return colouring_; }
   const Settings& settings() const { return settings_; }
   scene::View view() const;  // as text has it
+  std::string text() const;  // that text
   /// Throws Error, and changes nothing, for a target that is not there.
   void change(const Settings& settings);
   /// Glides there, slow in and slow out.
@@ -46,6 +47,8 @@ class Viewport final : public QOpenGLWidget {
   /// Through recorded views, as a film of them goes; a hand on the picture ends it. The simulation goes on by itself. Throws
   /// Error, and stays, for a target that is not there.
   void fly_along(std::vector<scene::View> views);
+  /// From the end of a path back to its beginning, and along it again, until a hand ends it.
+  void set_loop(bool loop) { loop_ = loop; }
   /// Glides to where the selected subarbor, or without one the whole forest, fills the picture.
   void centre();
 
@@ -55,8 +58,8 @@ class Viewport final : public QOpenGLWidget {
   const std::optional<std::uint32_t>& selected_synapse() const { return selected_synapse_; }
   /// The synapse that is drawn there, before all branches; and its branch.
   std::optional<std::pair<std::uint32_t, scene::Pick>> pick_synapse(const QPointF& place) const;
-  /// What is drawn at a place of this widget: to half a pixel, else the nearest branch within a few.
-  std::optional<scene::Pick> pick(const QPointF& place) const;
+  /// What is drawn at a place of this widget: to half a pixel, else the nearest branch within a few. A spine is its section.
+  std::optional<scene::Pick> pick(const QPointF& place);
 
   /// Shows a simulation on the branches, at its first moment and standing still.
   void play(scene::Playback playback);
@@ -135,15 +138,20 @@ class Viewport final : public QOpenGLWidget {
     scene::CameraPath path;
     frame::Camera end;
     float seconds;
-    bool whole = false;  // whole views, not cameras alone
+    bool whole = false;                   // whole views, not cameras alone
+    std::vector<scene::View> views = {};  // of a path, which is flown along next …
+    bool returns = false;                 // … as this glide leads back to its beginning
     QElapsedTimer clock{};
   };
 
   void set_camera(const frame::Camera& camera);
   void touch();                 // something changed: draw, and refine once it stands still
   void advance(float seconds);  // glide and flight
-  void make_renderer();         // in the current context; throws
-  void release();               // what lies in the current context
+  void glide_on();
+  /// Where the wheel goes: what was under the mouse as it began to turn; none where nothing is.
+  std::optional<Vec3> goal_under(const QPointF& place);
+  void make_renderer();  // in the current context; throws
+  void release();        // what lies in the current context
   void recover(const std::string& why);
   bool flies() const { return !held_.empty(); }
   void draw_moving();
@@ -151,6 +159,10 @@ class Viewport final : public QOpenGLWidget {
                   const DressingLimits& limits = {});
   void draw_part(const scene::View& view, std::uint32_t first, std::uint32_t last,
                  const DressingLimits& limits);
+  /// The branches of the selected neuron in the colours of their values, so near to the eye that nothing hides them. None where
+  /// they are not drawn as branches are, or are seen through.
+  std::vector<frame::Overlay> in_front(const scene::View& view, const scene::Eye& eye,
+                                       const scene::Chooser::Painter& painter) const;
   std::uint32_t samples_at_rest() const;
   void refine();
   void took(float milliseconds);
@@ -174,6 +186,7 @@ class Viewport final : public QOpenGLWidget {
   scene::Colouring colouring_;
   std::vector<frame::Overlay> outline_, highlight_;
   std::optional<Vec3> pia_;  // which way it lies
+  bool has_axons_;
   Dressing dressing_;
   std::optional<Selection> selection_;
   std::optional<std::uint32_t> selected_synapse_;
@@ -195,8 +208,15 @@ class Viewport final : public QOpenGLWidget {
   QTimer rest_;         // runs out when the view has stood still
   QElapsedTimer tick_;  // since the last step of flight
   std::optional<Glide> glide_;
-  std::set<int> held_;  // keys of flight
-  bool fast_ = false;   // with Shift
+  bool loop_ = false;
+  struct Approach {
+    QPointF place;
+    Vec3 goal;  // in the world
+    QElapsedTimer clock{};
+  };
+  std::optional<Approach> approach_;  // of the wheel
+  std::set<int> held_;                // keys of flight
+  bool fast_ = false;                 // with Shift
   QPointF pressed_, mouse_;
   bool dragged_ = false;
 };

@@ -110,6 +110,8 @@ Window::Window(scene::Forest forest, const scene::View& view, const QString& tit
   show_targets();
   connect(viewport_, &Viewport::opened, this, [this] {
     activity_panel_->show_activity();
+    hide_what_is_empty();
+    if (before_) return;
     activity_dock_->show();
     activity_dock_->raise();
   });
@@ -119,6 +121,7 @@ Window::Window(scene::Forest forest, const scene::View& view, const QString& tit
       [this](const QString& why) {
         activity_panel_->clear_traces();
         activity_panel_->follow();
+        hide_what_is_empty();
         tell(tr("The simulation is shown no more: %1").arg(why));
       },
       Qt::QueuedConnection);
@@ -134,10 +137,13 @@ Window::Window(scene::Forest forest, const scene::View& view, const QString& tit
       },
       Qt::QueuedConnection);
 
-  resize(1280, 800);
   QSettings kept;
+  resize(1280, 800);
   restoreGeometry(kept.value("window/geometry").toByteArray());
+  resize(fitting(size()));
   restoreState(kept.value(panels_key()).toByteArray());
+  section_dock_->setVisible(viewport_->settings().plane);  // whatever was there in an earlier session
+  hide_what_is_empty();
   viewport_->setFocus();
 }
 
@@ -149,6 +155,38 @@ void Window::renew() {
   viewport_->setVisible(true);
   show();
   activateWindow();
+  viewport_->setFocus();
+}
+
+QSize Window::fitting(const QSize& size) const {
+  constexpr QSize frame(8, 40);
+  const QSize room = screen()->availableSize();
+  return {size.width() <= room.width() ? size.width() : room.width() - frame.width(),
+          size.height() <= room.height() ? size.height() : room.height() - frame.height()};
+}
+
+void Window::hide_what_is_empty() {
+  const bool plane = viewport_->settings().plane, activity = viewport_->playback();
+  if (!plane) section_dock_->hide();
+  if (!activity) activity_dock_->hide();
+  section_dock_->toggleViewAction()->setEnabled(plane);
+  activity_dock_->toggleViewAction()->setEnabled(activity);
+  for (QAction* action : of_activity_) action->setEnabled(activity);
+}
+
+void Window::present(bool on) {
+  if (on == before_.has_value()) return;
+  if (on) {
+    before_ = {saveGeometry(), saveState(), windowState()};
+    for (QDockWidget* dock : findChildren<QDockWidget*>()) dock->hide();
+  } else {
+    restoreState(before_->panels);
+    hide_what_is_empty();
+  }
+  menuBar()->setVisible(!on);
+  statusBar()->setVisible(!on);
+  setWindowState(on ? windowState() | Qt::WindowFullScreen : before_->state);
+  if (!on) before_.reset();
   viewport_->setFocus();
 }
 
@@ -176,7 +214,11 @@ void Window::add_docks() {
       {[change](const scene::Appearance& who, const scene::Appearance& what, bool own_colour) {
          change([&](Settings& settings) { change_target(settings.view, who, what, own_colour); });
        },
-       [this](const QString& expression) { return add_target(expression); }},
+       [this](const QString& expression) { return add_target(expression); },
+       [change](const scene::Appearance& all, const scene::Appearance& who) {
+         change([&](Settings& settings) { show_only(settings.view, all, who); });
+       },
+       [change] { change([](Settings& settings) { show_all(settings.view); }); }},
       this);
   section_panel_ =
       new SectionPanel(viewport_->forest(), viewport_->settings(), viewport_->colouring(), change, this);
@@ -191,13 +233,18 @@ void Window::add_docks() {
     dock->setWidget(widget);
     const bool section = widget == section_panel_;  // a picture of its own, for those who ask for it
     addDockWidget(section ? Qt::LeftDockWidgetArea : Qt::RightDockWidgetArea, dock);
-    if (section)
-      connect(viewport_, &Viewport::changed, dock, [this, dock, shown = false]() mutable {
-        if (const bool wanted = viewport_->settings().plane; wanted != shown)
-          dock->setVisible(shown = wanted);
-      });
-    else
+    if (section) {
+      section_dock_ = dock;
+      connect(viewport_, &Viewport::changed, dock,
+              [this, dock, shown = viewport_->settings().plane]() mutable {
+                if (const bool wanted = viewport_->settings().plane; wanted != shown) {
+                  dock->setVisible((shown = wanted) && !before_);
+                  hide_what_is_empty();
+                }
+              });
+    } else {
       added.push_back(dock);
+    }
     dock->setVisible(!section && (widget == scroll || !surfaces_alone()));
   }
   if (surfaces_alone())
@@ -265,13 +312,14 @@ void Window::add_menus() {
          if (const auto& s = viewport_->selection())
            if (const auto parent = parent_of(viewport_->forest(), s->pick)) viewport_->select(parent);
        }},
-      {"&Edit", "C&lear the selection", "Esc", "Select nothing", [this] { viewport_->select(std::nullopt); }},
+      {"&Edit", "C&lear the selection", "Esc", "Select nothing; ends full screen first",
+       [this] { before_ ? present(false) : viewport_->select(std::nullopt); }},
       {"&View", "&Centre on the selection", "F", "Go to where the selected subarbor fills the picture",
        [this] { viewport_->centre(); }},
       {"&View", "&Whole forest", "Home", "Go back outside and see everything",
        [this] { viewport_->glide_to(viewport_->whole()); }},
-      {"&View", "&Full screen", "F11", "The window over the whole screen, and back",
-       [this] { setWindowState(windowState() ^ Qt::WindowFullScreen); }},
+      {"&View", "&Full screen", "F11", "The picture alone over the whole screen; F11 or Esc brings all back",
+       [this] { present(!before_); }},
       {"&Activity", "&Play or pause", "Space", "Let the simulation go on, or stand still",
        [this] { viewport_->set_playing(!viewport_->playing()); }},
       {"&Activity", "Step &forward", ".", "To the next moment of the simulation",
@@ -288,23 +336,35 @@ void Window::add_menus() {
       if (action->text() == tr(name)) return action->menu();
     return menuBar()->addMenu(tr(name));
   };
-  const auto add = [](QMenu* to, const char* name, const char* shortcut, const char* hint) {
+  const auto add = [this](QMenu* to, const char* name, const char* shortcut, const char* hint) {
     QAction* action = to->addAction(tr(name));
     action->setShortcut(QKeySequence(shortcut));
     action->setStatusTip(tr(hint));
     action->setToolTip(tr(hint));
+    addAction(action);  // keys are to work while the menus are hidden
     return action;
   };
   for (const char* name : {"&File", "&Edit", "&View", "&Activity", "&Panels", "&Help"}) menu(name);
-  for (const Command& c : commands)
-    connect(add(menu(c.menu), c.name, c.shortcut, c.hint), &QAction::triggered, this, c.run);
+  for (const Command& c : commands) {
+    QAction* action = add(menu(c.menu), c.name, c.shortcut, c.hint);
+    connect(action, &QAction::triggered, this, c.run);
+    if (menu("&Activity")->actions().contains(action)) of_activity_.push_back(action);
+    if (action->shortcut() != QKeySequence("Ctrl+Shift+K")) continue;
+    QAction* loop = add(menu(c.menu), "&Loop paths", "Ctrl+L",
+                        "From the end of a path back to its beginning, and along it again");
+    loop->setCheckable(true);
+    connect(loop, &QAction::toggled, viewport_, &Viewport::set_loop);
+  }
   QMenu* view = menu("&View");
   view->addSeparator();
   for (const Toggle& toggle : toggles()) {
     QAction* action = add(view, toggle.name, toggle.shortcut, toggle.hint);
     action->setCheckable(true);
     connect(action, &QAction::triggered, this, [this, &toggle](bool on) { set(toggle, on); });
-    const auto show = [this, action, &toggle] { action->setChecked(toggle.value(viewport_->settings())); };
+    const auto show = [this, action, &toggle] {
+      action->setChecked(toggle.value(viewport_->settings()));
+      action->setEnabled(toggle.usable(viewport_->settings()));
+    };
     connect(viewport_, &Viewport::changed, action, show);
     show();
   }
@@ -317,6 +377,7 @@ void Window::add_menus() {
   for (QDockWidget* dock : findChildren<QDockWidget*>()) {
     QAction* action = dock->toggleViewAction();
     action->setShortcut(QKeySequence(QString("Ctrl+%1").arg(++number)));
+    addAction(action);
     menu("&Panels")->addAction(action);
   }
 }
@@ -332,8 +393,25 @@ void Window::show_figures() {
   sight_->setText(tr("%1 of %2 neurons in sight")
                       .arg(locale.toString(f.neurons),
                            locale.toString(qulonglong(viewport_->forest().instances().size()))));
-  quality_->setText(tr("%1 samples, error %2 pixels").arg(f.samples).arg(double(f.error), 0, 'f', 1));
+  quality_->setText(tr(f.samples == 1 ? "%1 sample, error %2 pixels" : "%1 samples, error %2 pixels")
+                        .arg(f.samples)
+                        .arg(double(f.error), 0, 'f', 1));
   renderer_->setText(viewport_->renderer_name());
+  share_status_bar();
+}
+
+void Window::share_status_bar() {
+  constexpr int between = 8;
+  int room = width() - between;
+  for (QLabel* label : {drawn_, sight_, renderer_, pace_, quality_}) {  // the most telling first
+    room -= label->sizeHint().width() + between;
+    label->setVisible(room >= 0);
+  }
+}
+
+void Window::resizeEvent(QResizeEvent* event) {
+  QMainWindow::resizeEvent(event);
+  share_status_bar();
 }
 
 void Window::show_targets() {
@@ -359,7 +437,7 @@ QString Window::add_target(const QString& expression) {
 }
 
 void Window::copy_view() {
-  QApplication::clipboard()->setText(QString::fromStdString(scene::to_json(viewport_->view())));
+  QApplication::clipboard()->setText(QString::fromStdString(viewport_->text()));
   statusBar()->showMessage(tr("The view is on the clipboard as one line of JSON."), 4000);
 }
 
@@ -369,7 +447,7 @@ void Window::record_view() {
                                          nullptr, QFileDialog::DontConfirmOverwrite);
   if (path_.isEmpty()) return;
   QFile file(path_);
-  const std::string line = scene::to_json(viewport_->view()) + "\n";
+  const std::string line = viewport_->text() + "\n";
   if (!file.open(QIODevice::Append) || file.write(line.data(), qint64(line.size())) != qint64(line.size())) {
     QMessageBox::warning(this, tr("Path of views"),
                          tr("%1 cannot be written: %2").arg(path_, file.errorString()));
@@ -393,11 +471,12 @@ void Window::play_path() {
 
 void Window::paste_view() {
   try {
+    const std::string text = QApplication::clipboard()->text().toStdString();
+    const Vec3& up = viewport_->forest().circuit().up;
     Settings settings = viewport_->settings();
-    set_view(settings,
-             scene::parse_view(QApplication::clipboard()->text().toStdString(), "clipboard",
-                               viewport_->forest().circuit().up),
-             viewport_->forest().soma_bounds().centre());
+    set_view(settings, scene::parse_view(text, "clipboard", up), viewport_->forest().soma_bounds().centre());
+    settings.skin = asks_for_skin(
+        [&](const scene::View& unless) { return scene::parse_view(text, "clipboard", up, &unless); });
     viewport_->change(settings);
   } catch (const std::exception& error) {
     statusBar()->showMessage(QString::fromUtf8(error.what()), 8000);
@@ -545,8 +624,8 @@ void Window::explain() {
 
 void Window::closeEvent(QCloseEvent* event) {
   QSettings kept;
-  kept.setValue("window/geometry", saveGeometry());
-  kept.setValue(panels_key(), saveState());
+  kept.setValue("window/geometry", before_ ? before_->geometry : saveGeometry());
+  kept.setValue(panels_key(), before_ ? before_->panels : saveState());
   QMainWindow::closeEvent(event);
 }
 

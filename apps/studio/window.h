@@ -45,12 +45,19 @@ class Window final : public QMainWindow {
 
  protected:
   void closeEvent(QCloseEvent* event) override;
+  void resizeEvent(QResizeEvent* event) override;
 
  private:
+  // As large as the screen has room for, of which the frame takes some.
+  QSize fitting(const QSize& size) const;
   void renew();                 // the window on the screen, and all contexts with it
   bool surfaces_alone() const;  // there is no forest: nothing to select, no targets
   QString panels_key() const;
   void add_docks();
+  void hide_what_is_empty();  // panels that have nothing to show, and what acts on it
+  /// The picture alone over the whole screen, as in an exhibit; or all as it was before.
+  void present(bool on);
+  void share_status_bar();             // figures that have no room are left out, rather than cut off
   void tell(const QString& sentence);  // in the status bar, and where the program was started
   void add_menus();
   void show_figures();
@@ -80,7 +87,13 @@ class Window final : public QMainWindow {
   TargetsPanel* targets_panel_;
   SectionPanel* section_panel_;
   ActivityPanel* activity_panel_;
-  QDockWidget* activity_dock_;
+  QDockWidget *activity_dock_, *section_dock_;
+  QList<QAction*> of_activity_;  // that need a simulation
+  struct Before {                // a picture that is presented
+    QByteArray geometry, panels;
+    Qt::WindowStates state;
+  };
+  std::optional<Before> before_;
   QLabel *pace_, *drawn_, *sight_, *quality_, *renderer_;
   QString path_;       // where views are recorded
   QTimer panel_rest_;  // the panel follows a moving view a few times a second

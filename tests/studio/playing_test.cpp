@@ -139,6 +139,35 @@ TEST_F(Playing, AClickOnARowOfTheRasterSelectsItsNeuron) {
   }
 }
 
+TEST_F(Playing, ASelectedSectionHasAWhiteRimAndKeepsTheColourOfItsValue) {
+  Random random(22);
+  Target target;
+  RoundCone branch;
+  do {  // so wide that its middle is no rim
+    target = clear_target(random, view_, viewport(), true);
+    branch = scene::in_world(sample(), target.pick->instance, target.pick->segment);
+  } while (std::min(branch.radius_a, branch.radius_b) <
+           3.f * view_.camera.pixel_size(viewport().height, float(target.pick->distance)));
+  const auto white = [](const io::Picture& p, std::size_t x, std::size_t y) {
+    const std::uint8_t* pixel = &p.pixels[4 * (y * p.width + x)];
+    return std::min({pixel[0], pixel[1], pixel[2]}) > 130;
+  };
+  const auto x = std::size_t(target.pixel.x()), y = std::size_t(target.pixel.y());
+  const auto around = [&](const io::Picture& p) {
+    std::size_t count = 0;
+    for (std::size_t j = y > 40 ? y - 40 : 0; j < std::min<std::size_t>(y + 40, p.height); ++j)
+      for (std::size_t i = x > 40 ? x - 40 : 0; i < std::min<std::size_t>(x + 40, p.width); ++i)
+        count += white(p, i, j);
+    return count;
+  };
+  const io::Picture before = saved("rim_before.png");
+  click(target.pixel);
+  finish();
+  const io::Picture after = saved("rim.png");
+  EXPECT_GT(around(after), around(before) + 10);
+  EXPECT_FALSE(white(after, x, y));
+}
+
 TEST_F(Playing, AViewCopiedWithItsMomentGoesBackThere) {
   key("period period");
   settle();

@@ -97,6 +97,19 @@ TEST(Studio, WritesAScreenshotOfItsWindow) {
   EXPECT_EQ(picture.height, 700u);
 }
 
+// Of a screen whose pixels are smaller: the size is still that of the picture.
+TEST(Studio, TheSizeIsInPixelsOfTheScreen) {
+  if (!std::getenv("DISPLAY")) GTEST_SKIP() << "there is no display; ctest runs this under xvfb-run";
+  const std::string picture = folder / "fine_pixels.png";
+  setenv("QT_SCALE_FACTOR", "1.5", 1);
+  Studio studio({sample_file(), "--size", "1200x780", "--screenshot", picture});
+  unsetenv("QT_SCALE_FACTOR");
+  EXPECT_EQ(studio.end().second, 0);
+  const io::Picture seen = io::read_png(picture);
+  EXPECT_NEAR(double(seen.width), 1200., 1.);
+  EXPECT_NEAR(double(seen.height), 780., 1.);
+}
+
 TEST(Studio, SaysWhichNodeSetReplacesWhich) {
   if (!std::getenv("DISPLAY")) GTEST_SKIP() << "there is no display; ctest runs this under xvfb-run";
   sample_file();

@@ -88,19 +88,33 @@ TEST_F(Window, SavedPictureIsThatOfTheViewDrawnWithoutAWindow) {
 }
 
 TEST_F(Window, WheelComesNearerToWhatIsUnderTheMouse) {
-  const scene::View old = view_;
-  point({200, 200});
+  Random random(17);
+  const Vec2 empty = clear_target(random, view_, viewport(), false).pixel;
+  scene::View old = view_;
+  point(empty);
   xdotool("click 4");
   settle();
   const float before = (old.camera.eye - old.camera.target).norm(),
               after = (view_.camera.eye - view_.camera.target).norm();
   EXPECT_LT(after, .95f * before);
   const auto at_target_depth = [&](const frame::Camera& camera) -> Vec3 {
-    const Ray ray = ray_through(camera, viewport(), {200, 200});
+    const Ray ray = ray_through(camera, viewport(), empty);
     const Vec3 forward = (camera.target - camera.eye).normalized();
     return camera.eye + ray.direction * ((camera.target - camera.eye).norm() / ray.direction.dot(forward));
   };
   EXPECT_LT((at_target_depth(old.camera) - at_target_depth(view_.camera)).norm(), 1.f);
+  // Towards a branch, steps are shares of the distance to it: it is reached, not passed.
+  key("Home");
+  for (frame::Camera last; view_.camera != last;) last = view_.camera, settle();  // the glide there
+  old = view_;
+  const Target target = clear_target(random, view_, viewport(), true);
+  point(target.pixel);
+  xdotool("click --repeat 12 --delay 20 4");
+  settle();
+  const RoundCone branch = scene::in_world(sample(), target.pick->instance, target.pick->segment);
+  const auto distance = [&](const frame::Camera& camera) { return (branch.a - camera.eye).norm(); };
+  EXPECT_NEAR(distance(view_.camera) / distance(old.camera), std::pow(.85f, 12.f), .08f);
+  EXPECT_EQ(click(target.pixel).at("neuron"), target.pick->instance);
 }
 
 TEST_F(Window, RightDragAndShiftDragMoveAcross) {
@@ -192,6 +206,79 @@ TEST_F(Window, APathOfViewsIsFlownToItsEnd) {
     finish();  // the first may be that of the dialog
   EXPECT_EQ(view_.colour_by, end.colour_by);
   EXPECT_LT((view_.camera.eye - end.camera.eye).norm(), 1.f);
+}
+
+TEST_F(Window, AtItsEndAPathThatLoopsGoesBackToItsBeginning) {
+  scene::View begin = view_, end = view_;
+  begin.camera.eye += Vec3(-80, 20, 0);
+  end.camera.eye += Vec3(120, 40, -60);
+  const auto path = folder / "loop.jsonl";
+  write_file(path, scene::to_json(begin) + "\n" + scene::to_json(end) + "\n");
+  key("ctrl+l");
+  key("ctrl+shift+k");
+  xdotool("search --sync --onlyvisible --name 'Path of views' windowfocus");
+  xdotool(fmt::format("key ctrl+a type --delay 5 '{}'", path.string()));
+  press_until("Return", "Path of views", 0);
+  usleep(3'500'000);  // of the path 2.5 s, and as long back: the way back is its last
+  xdotool("search --sync --onlyvisible --name 'Brain Forest' windowfocus");
+  key("ctrl+l");
+  const auto at = [&](const scene::View& there) {
+    return (view_.camera.eye - there.camera.eye).norm() < 1.f;
+  };
+  for (int i = 0; i < 4 && !at(begin) && !at(end); ++i) finish();
+  EXPECT_TRUE(at(begin));
+}
+
+TEST_F(Window, FullScreenShowsThePictureAloneAndEscapeBringsAllBack) {
+  const frame::Viewport before = viewport();
+  Random random(18);
+  const Json facts = click(clear_target(random, view_, viewport(), true).pixel);
+  finish();
+  for (const char* back : {"Escape", "F11"}) {
+    key("F11");
+    while (viewport().width < 1280.f || viewport().height < 800.f) finish();
+    EXPECT_EQ(picture_.at("x"), 0);
+    EXPECT_EQ(picture_.at("y"), 0);
+    key("b");  // keys work without the menus
+    const scene::Background old = view_.background;
+    while (view_.background == old) finish();
+    key(back);
+    while (viewport().width > before.width) finish();
+    EXPECT_EQ(viewport().width, before.width);
+    EXPECT_EQ(viewport().height, before.height);
+  }
+  key("p");  // the selection is still there, and so it has a parent
+  EXPECT_EQ(studio_->wait_for("selected").at("facts").at("neuron"), facts.at("neuron"));
+}
+
+TEST_F(Window, OneTargetIsShownAloneAndThenAllAgain) {
+  key("alt+t");
+  key("ctrl+Return");
+  settle();
+  ASSERT_EQ(view_.targets.size(), 2u);
+  EXPECT_EQ(view_.targets[0].name, "all");
+  EXPECT_EQ(view_.targets[0].visible, false);
+  EXPECT_EQ(view_.targets[1].name, "first");
+  EXPECT_EQ(view_.targets[1].visible, true);
+  key("alt+t");
+  key("ctrl+shift+Return");
+  settle();
+  EXPECT_TRUE(view_.targets.empty());
+}
+
+TEST_F(Window, PanelsThatHaveNothingToShowStayHidden) {
+  // Left by a session with a plane and its section.
+  const frame::Viewport before = viewport();
+  key("k");
+  settle();
+  EXPECT_LT(viewport().width, before.width);
+  key("ctrl+q");
+  EXPECT_EQ(studio_->end().second, 0);
+  studio_ =
+      std::make_unique<Studio>(std::vector<std::string>{sample_file(), "--size", "1280x800", "--report"});
+  finish();
+  EXPECT_EQ(viewport().width, before.width);
+  EXPECT_EQ(viewport().height, before.height);
 }
 
 TEST_F(Window, ControlsHaveKeys) {
@@ -353,6 +440,20 @@ TEST_F(OnACard, ThatIsLostTheForestIsLoadedAnewAndThenDrawnByTheProcessor) {
     for (std::size_t i = 0; i < picture.pixels.size(); i += 4) reds.insert(picture.pixels[i]);
     EXPECT_GT(reds.size(), 40u);
   }
+}
+
+TEST_F(Near, ACopiedViewKeepsItsSkin) {
+  key("n");
+  settle();
+  const std::size_t with = skin_;
+  EXPECT_GT(with, 100u);
+  key("ctrl+c");
+  key("n");
+  settle();
+  EXPECT_EQ(skin_, 0u);
+  key("ctrl+v");
+  settle();
+  EXPECT_GT(skin_, 100u);
 }
 
 TEST_F(Near, SkinIsMadeWhenAskedForAndWhenATargetIsForcedToHaveOne) {
