@@ -77,9 +77,15 @@ void Console::warn(std::string_view sentence) {
   warnings_.emplace_back(sentence);
 }
 
+void Console::fail(std::string_view sentence) {
+  if (!printed_) print({{"error", sentence}});
+  warn(fmt::format("brainforest: {}", sentence));
+}
+
 void Console::print(nlohmann::ordered_json value) {
   bar_.end();
   if (!json) return;
+  printed_ = true;
   if (value.is_object() && !warnings_.empty() && !value.contains("warnings")) value["warnings"] = warnings_;
   put(value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
 }

@@ -42,6 +42,8 @@ class Console {
   Progress& progress() { return bar_; }
   void say(std::string_view line);       // to standard output, unless --json
   void warn(std::string_view sentence);  // to standard error
+  /// Why the command ends with status 1; with --json also as `error` of an object, where nothing was printed.
+  void fail(std::string_view sentence);
   /// To standard output, when --json; an object has, as `warnings`, what was warned of before.
   void print(nlohmann::ordered_json value);
   /// Columns aligned, numbers right; to standard output, unless --json.
@@ -50,6 +52,7 @@ class Console {
  private:
   ProgressBar bar_;
   std::vector<std::string> warnings_;
+  bool printed_ = false;
 };
 
 /// "1 finding", "2 findings", "2 losses": an s where no plural is given.

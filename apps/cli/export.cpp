@@ -143,7 +143,7 @@ std::function<void()> export_files(CLI::App& command, Console& console) {
   for (const io::Format& format : io::formats())
     if (format.write) formats.emplace_back(format.name);
   command.add_option("neurons", options->names,
-                     "Neurons, by name or by the id that list shows; all when none is named");
+                     "Neurons, by name, or by the id that list shows: 12 or '#12'; all when none is named");
   command.add_option("--repo", options->repo, "The repository")->required()->type_name("REPO");
   must_be_name(*command.add_option("--population", options->population, "Only those of this population"));
   command

@@ -77,6 +77,7 @@ std::vector<fs::path> neuron_files(const std::vector<std::string>& names, Consol
     }
     const auto first = std::ptrdiff_t(files.size());
     std::vector<fs::path> folders{name};
+    std::vector<std::string> linked;
     while (!folders.empty()) {
       const fs::path folder = std::move(folders.back());
       folders.pop_back();
@@ -84,17 +85,22 @@ std::vector<fs::path> neuron_files(const std::vector<std::string>& names, Consol
       for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
         const fs::path& path = entry->path();
         if (entry->is_directory(none)) {
-          if (!entry->is_symlink(none)) folders.push_back(path);  // a link may lead in a circle
+          if (entry->is_symlink(none))
+            linked.push_back(repository::escaped(path.string()));  // it may lead in a circle
+          else
+            folders.push_back(path);
         } else if (known(path) || (entry->is_regular_file(none) && looks_like_neuron(path))) {
           files.push_back(path);
         } else {
           ++skipped[extension_of(path)];
         }
       }
-      if (error)
-        console.warn(fmt::format("{}: the folder cannot be read ({}) and is skipped; check its permissions",
-                                 repository::escaped(folder.string()), error.message()));
+      if (error) files.push_back(folder);  // whoever reads it says why it cannot be read
     }
+    if (!linked.empty())
+      console.warn(fmt::format("{} of {} {} skipped, first {}; name what is to be read",
+                               counted(linked.size(), "linked folder"), repository::escaped(name),
+                               linked.size() == 1 ? "is" : "are", linked.front()));
     if (first == std::ptrdiff_t(files.size()))
       throw InputError(name, 0, "holds no file of a known format; name the files themselves");
     std::sort(files.begin() + first, files.end());

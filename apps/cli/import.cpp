@@ -194,7 +194,7 @@ void report(const std::vector<Arrival>& files, const Options& options, Console& 
                  {"already_there", there},
                  {"failed", failed},
                  {"skipped", skipped},
-                 {"warnings", warnings},
+                 {"oddities", warnings},
                  {"files", list}});
   if (failed)
     throw Error(fmt::format("{} of {} could not be read; the sentences above say why", failed,

@@ -76,14 +76,15 @@ int main(int argc, char** argv) {
       throw forest::Error("what was to be said cannot be written; check that the disk has room");
     return 0;
   } catch (const std::bad_alloc&) {
-    console.warn(
-        "brainforest: there is not enough memory for this; make less at once: a smaller picture (--size), "
-        "fewer or smaller neurons");
+    console.fail(
+        "there is not enough memory for this; make less at once: a smaller picture (--size), fewer or "
+        "smaller "
+        "neurons");
   } catch (const std::filesystem::filesystem_error& error) {
-    console.warn(fmt::format("brainforest: {}: {}; check the path, and who may read and write there",
+    console.fail(fmt::format("{}: {}; check the path, and who may read and write there",
                              repository::escaped(error.path1().string()), error.code().message()));
   } catch (const std::exception& error) {
-    console.warn(fmt::format("brainforest: {}", error.what()));
+    console.fail(error.what());
   }
   return 1;
 }

@@ -18,8 +18,9 @@ using namespace repository;
 
 namespace {
 
+// Of "#12", and of "12" where nothing is called so.
 std::optional<NeuronId> id_of(const std::string& text) {
-  const auto id = number_of<std::uint32_t>(text);
+  const auto id = number_of<std::uint32_t>(std::string_view(text).substr(text.starts_with('#')));
   return id && *id ? std::optional(NeuronId(*id)) : std::nullopt;
 }
 

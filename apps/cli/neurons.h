@@ -21,7 +21,7 @@ namespace forest::cli {
 /// To be written into. One that is missing is not made, but told.
 repository::Repository open_to_write(const std::string& repo);
 
-/// The neurons called `names` (a name, or the id that `list` shows), in that order; all when there are none. Only those
+/// The neurons called `names` (a name, or the id that `list` shows as "#12", or "12" where none has that name), in that order; all when there are none. Only those
 /// of `population` unless that is empty. Throws Error when there is no such neuron or population, or when a name is that
 /// of neurons in several populations.
 std::vector<repository::NeuronRow> pick_neurons(const repository::Repository& repository,

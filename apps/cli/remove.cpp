@@ -7,6 +7,10 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "forest/core/error.h"
+#include "forest/core/number.h"
+#include "forest/repository/names.h"
+
 #include "apps/cli/console.h"
 #include "apps/cli/neurons.h"
 #include "apps/cli/verb.h"
@@ -21,8 +25,19 @@ struct Options {
   std::string repo, population;
 };
 
+// A number that is no name may be that of a neuron which had it, is gone already, and must not take another with it.
+void must_be_names(const Repository& repository, const Options& options) {
+  for (const std::string& name : options.names)
+    if (const auto id = number_of<std::uint32_t>(name);
+        id && repository.find(name, options.population).empty())
+      if (const auto row = *id ? repository.neuron(NeuronId(*id)) : std::nullopt)
+        throw Error(fmt::format("no neuron is called '{0}'; that with the id {0}, {1}, is removed as '#{0}'",
+                                *id, shown(row->name)));
+}
+
 void run(const Options& options, Console& console) {
   Repository repository = open_to_write(options.repo);
+  must_be_names(repository, options);
   auto transaction = repository.begin();
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   std::vector<std::vector<std::string>> lines;
@@ -43,7 +58,7 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> remove_neurons(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  command.add_option("neurons", options->names, "Neurons, by name or by the id that list shows")
+  command.add_option("neurons", options->names, "Neurons, by name, or by the id that list shows, as '#12'")
       ->required()
       ->type_name("NEURONS");
   command.add_option("--repo", options->repo, "The repository")->required()->type_name("REPO");

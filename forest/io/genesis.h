@@ -20,8 +20,12 @@
 namespace forest::io {
 
 /// A compartment has one diameter and a length, so a point where another lies already has no place.
-inline constexpr Keeps genesis_keeps{
-    .contours = false, .still_points = false, .lengthless = false, .zero_radii = false, .spines = false};
+inline constexpr Keeps genesis_keeps{.foreign_tags = false,
+                                     .contours = false,
+                                     .still_points = false,
+                                     .lengthless = false,
+                                     .zero_radii = false,
+                                     .spines = false};
 
 bool recognises_genesis(std::string_view bytes);
 

@@ -14,6 +14,7 @@ namespace forest::io {
 namespace {
 
 std::int32_t kept_tag(const Section& s, const Keeps& keeps) {
+  if (keeps.kinds && keeps.tags && !keeps.foreign_tags && swc_type(s) != s.tag) return swc_type(s);
   const bool kept = keeps.kinds && keeps.tags && s.tag >= -keeps.largest_tag && s.tag <= keeps.largest_tag;
   return kept ? s.tag : std::int32_t(keeps.kinds ? s.kind : SectionKind::undefined);
 }
@@ -232,15 +233,22 @@ std::vector<Warning> losses(const Morphology& m, const Keeps& keeps) {
       warnings.push_back({0, "diameters-lifted",
                           fmt::format("{} diameters of 0 become {} µm", count, keeps.least_diameter)});
   }
+  const auto foreign = [&](const Section& s) { return !keeps.foreign_tags && swc_type(s) != s.tag; };
   const auto too_large = [&](const Section& s) {
-    return s.kind == SectionKind::custom && kept_tag(s, keeps) != s.tag;
+    return s.kind == SectionKind::custom && kept_tag(s, keeps) != s.tag && !foreign(s);
   };
-  if (const auto count = std::ranges::count_if(m.sections(), too_large); count && keeps.kinds && keeps.tags)
-    warnings.push_back({0, "tags-lost",
-                        fmt::format("the numbers of {} sections of a custom kind, above {}, are left out",
-                                    count, keeps.largest_tag)});
+  const auto lost = [&](std::ptrdiff_t count, const std::string& which) {
+    if (count && keeps.kinds && keeps.tags)
+      warnings.push_back(
+          {0, "tags-lost", fmt::format("the numbers of {} sections {}, are left out", count, which)});
+  };
+  lost(std::ranges::count_if(m.sections(), too_large),
+       fmt::format("of a custom kind, above {}", keeps.largest_tag));
+  lost(std::ranges::count_if(m.sections(), foreign),
+       "that mean another kind in SWC, as of glia and spines in HDF5");
   const auto moved = [&](const Point& p) { return keeps.step > 0.f && kept_point(p, keeps) != p; };
-  if (const auto count = std::ranges::count_if(m.points(), moved))
+  if (const auto count =
+          std::ranges::count_if(m.points(), moved) + std::ranges::count_if(m.soma().points, moved))
     warnings.push_back(
         {0, "rounded",
          fmt::format("places and diameters of {} points are rounded to {} µm", count, keeps.step)});

@@ -32,13 +32,14 @@ inline std::size_t count_of(std::span<const Warning> warnings) {
 
 /// What of a neuron a format has words for. What it has none for is told when a neuron that has it is written.
 struct Keeps {
-  bool kinds = true;             // axon, basal, apical, glia
-  bool tags = true;              // the numbers of custom kinds
-  bool cylinders = true;         // a soma of several points; else a sphere of its mean size
-  bool contours = true;          // a soma of outlines; else a sphere of their mean radius
-  bool loose_roots = true;       // neurites that leave from no soma
-  bool soma_points = true;       // which soma point a neurite leaves from
-  bool joints = true;            // a daughter's own radius at the branch point
+  bool kinds = true;         // axon, basal, apical, glia
+  bool tags = true;          // the numbers of custom kinds
+  bool foreign_tags = true;  // numbers that say another kind in SWC, as HDF5 has of glia; else the kind's own
+  bool cylinders = true;     // a soma of several points; else a sphere of its mean size
+  bool contours = true;      // a soma of outlines; else a sphere of their mean radius
+  bool loose_roots = true;   // neurites that leave from no soma
+  bool soma_points = true;   // which soma point a neurite leaves from
+  bool joints = true;        // a daughter's own radius at the branch point
   bool single_daughters = true;  // a node with one daughter; else the two are one section
   bool stumps = true;            // a root of a single point
   bool still_points =

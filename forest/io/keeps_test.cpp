@@ -157,6 +157,22 @@ TEST(Keeps, DepthFirstIsTheSameTreeInAnotherOrder) {
   }
 }
 
+// HDF5 numbers processes of glia by numbers that mean dendrites in SWC.
+TEST(Keeps, NumbersOfAnotherKindAreTold) {
+  MorphologyBuilder b;
+  b.add_section({}, SectionKind::glia, zoo_parts::Points{{0, 0, 0, 1}, {0, 9, 0, 1}}, 2);
+  b.add_section({}, SectionKind::glia, zoo_parts::Points{{0, 0, 0, 1}, {0, -9, 0, 1}}, 7);
+  const Morphology m = b.build();
+  const Keeps keeps{.foreign_tags = false};
+  const auto told = losses(m, keeps);
+  ASSERT_EQ(told.size(), 1u);
+  EXPECT_EQ(told[0].code, "tags-lost");
+  EXPECT_THAT(told[0].sentence, testing::HasSubstr("1 sections"));
+  EXPECT_EQ(as_kept(m, keeps).sections()[0].tag, 7);
+  EXPECT_TRUE(losses(m, {}).empty());
+  EXPECT_EQ(as_kept(m, {}), m);
+}
+
 TEST(Keeps, WhatIsRoundedOrTooLargeIsTold) {
   const Keeps keeps{.spine_sizes = false,
                     .step = .1f,

@@ -38,7 +38,7 @@ std::string write_swc(const Morphology& morphology);
 std::string write_eswc(const Morphology& morphology);
 
 inline constexpr std::array<std::string_view, 1> swc_keys{"synapse"};
-inline constexpr Keeps swc_keeps{.keys = false, .own_keys = swc_keys};
+inline constexpr Keeps swc_keeps{.foreign_tags = false, .keys = false, .own_keys = swc_keys};
 
 /// Every deviation that is read, in the order of enum SwcOddity (swc_rows.h).
 std::span<const Oddity> swc_oddities();

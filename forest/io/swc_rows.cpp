@@ -357,7 +357,12 @@ class Scanner {
     double decimal = 0.;
     const char* const end = text.data() + text.size() - 1;
     const auto [stop, error] = std::from_chars(text.data(), end, decimal);
-    if (error != std::errc() || stop != end || decimal != std::floor(decimal) || std::abs(decimal) > 9e15)
+    constexpr double most = 9e15;  // up to where a double has every whole number
+    if (error == std::errc() && stop == end && std::abs(decimal) > most)
+      throw InputError(name_, line_,
+                       fmt::format("column {} ({}) is {}, beyond {}; {}", column + 1, columns[column],
+                                   shown(tokens[column]), std::int64_t(most), layout));
+    if (error != std::errc() || stop != end || decimal != std::floor(decimal))
       throw InputError(name_, line_,
                        fmt::format("column {} ({}) is \"{}\", not a whole number; {}", column + 1,
                                    columns[column], shown(tokens[column]), layout));

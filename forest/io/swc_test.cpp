@@ -294,7 +294,7 @@ TEST(Swc, WhatCannotBeReadSaysWhereAndWhatToDo) {
       {2, "1 1 0 0 0 5 -1\n2 3 0 abc 0 1 1\n", "column 4 (y) is \"abc\", not a number"},
       {2, "1 1 0 0 0 5 -1\n2 3 0 5 0 1\n", "6 of 7 columns"},
       {2, "1 1 0 0 0 5 -1\n2.5 3 0 5 0 1 1\n", "not a whole number"},
-      {2, "1 1 0 0 0 5 -1\n2 3 0 5 0 1 1e30\n", "not a whole number"},
+      {2, "1 1 0 0 0 5 -1\n2 3 0 5 0 1 1e30\n", "beyond 9000000000000000"},
       {2, "1 1 0 0 0 5 -1\n2 3000000000 0 5 0 1 1\n", "type"},
       {2, "1 1 0 0 0 5 -1\n<html>\n2 3 0 5 0 1 1\n", "1 of 7 columns"},
       {3, "1 1 0 0 0 5 -1\n2 3 0 5 0 1 1\n3 3 0 6 0 1 4\n4 3 0 7 0 1 5\n5 3 0 8 0 1 3\n", "3 -> 4 -> 5 -> 3"},

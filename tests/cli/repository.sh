@@ -157,7 +157,8 @@ grep -q "hurt.db: 1 finding; the sentence above" err.txt
 sqlite3 hurt.db "update points set data = x'00' where neuron = $id"
 fails_with 1 "neuron 'cell07' (id $id) is damaged" $BRAINFOREST check --repo hurt.db
 fails_with 1 "brainforest remove" $BRAINFOREST show cell07 --repo hurt.db
-[ "$($BRAINFOREST remove cell07 "$id" --repo hurt.db --json | json '[(r["id"], r["name"], r["population"]) for r in d["removed"]]')" = "[($id, 'cell07', 'P')]" ]
+fails_with 1 "is removed as '#$id'" $BRAINFOREST remove cell07 "$id" --repo hurt.db
+[ "$($BRAINFOREST remove cell07 "#$id" --repo hurt.db --json | json '[(r["id"], r["name"], r["population"]) for r in d["removed"]]')" = "[($id, 'cell07', 'P')]" ]
 [ "$($BRAINFOREST check --repo hurt.db)" = 'hurt.db: all is well' ]
 fails_with 1 "there is no neuron 'cell07'" $BRAINFOREST remove cell00 cell07 --repo hurt.db --population P
 [ "$(sqlite3 hurt.db "select count(*) from neurons where name = 'cell00'")" = 2 ]  # all or none

@@ -245,7 +245,7 @@ assert result["stored"] and "has become odd" in errors, errors
 
 # A removed neuron, and another repository.
 edited(lambda b: None)
-subprocess.run([program, "remove", "2", "--repo", "cells.db"], check=True, capture_output=True)
+subprocess.run([program, "remove", "#2", "--repo", "cells.db"], check=True, capture_output=True)
 result, errors = run("book.xlsx", status=1)
 assert [f["cell"] for f in result["refused"]] == ["neurons!A3"], result["refused"]
 assert "there is no such repository" in run("book.xlsx", repo="none.db", status=1)[1] and not os.path.exists("none.db")
