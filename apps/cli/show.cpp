@@ -174,8 +174,8 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> show(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  CLI::Option* names =
-      command.add_option("neurons", options->names, "Neurons, by name, or by the id that list shows: 12 or '#12'");
+  CLI::Option* names = command.add_option("neurons", options->names,
+                                          "Neurons, by name, or by the id that list shows: 12 or '#12'");
   command.add_option("--repo", options->repo, "The repository")->required()->type_name("REPO");
   CLI::Option* population = command.add_option("--population", options->population,
                                                "Of this population; all of it when no neuron is named");
