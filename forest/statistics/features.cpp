@@ -36,42 +36,39 @@ constexpr auto slopes = std::to_array<std::string_view>({"length_along_z_by_x", 
                                                          "section_length_fractions_along_z",
                                                          "segment_elevations", "level_segment_fraction"});
 
-// What else changes when the same cell is traced by more points, or lies turned about the direction of the pia; of points everything does.
-constexpr auto tracing = std::to_array<std::string_view>({"number_of_segments",
-                                                          "width",
-                                                          "height",
-                                                          "depth",
-                                                          "total_width",
-                                                          "total_depth",
-                                                          "surface",
-                                                          "volume",
-                                                          "aspect_ratio",
-                                                          "circularity",
-                                                          "shape_factor",
-                                                          "fractal_dimension_boxes",
-                                                          "section_taper_rates",
-                                                          "taper_1",
-                                                          "taper_2",
-                                                          "fragmentation",
-                                                          "fractal_dim",
-                                                          "parent_daughter_ratio",
-                                                          "diam_threshold",
-                                                          "sibling_ratios",
-                                                          "daughter_ratio",
-                                                          "rall_power",
-                                                          "pk",
-                                                          "pk_classic",
-                                                          "pk_2",
-                                                          "diameter_power_relations",
-                                                          "hillman_threshold",
-                                                          "principal_direction_extents",
-                                                          "principal_direction_extents_2",
-                                                          "principal_direction_extents_3",
-                                                          "trunk_vectors_x",
-                                                          "trunk_vectors_z",
-                                                          "trunk_origin_azimuths",
-                                                          "trunk_origin_elevations",
-                                                          "trunk_angles"});
+// What changes when the same cell is traced by more points; of points everything does.
+constexpr auto dense = std::to_array<std::string_view>({"number_of_segments",
+                                                        "level_segment_fraction",
+                                                        "width",
+                                                        "height",
+                                                        "depth",
+                                                        "surface",
+                                                        "volume",
+                                                        "aspect_ratio",
+                                                        "section_taper_rates",
+                                                        "taper_1",
+                                                        "taper_2",
+                                                        "fragmentation",
+                                                        "fractal_dim",
+                                                        "parent_daughter_ratio",
+                                                        "diam_threshold",
+                                                        "sibling_ratios",
+                                                        "daughter_ratio",
+                                                        "rall_power",
+                                                        "pk",
+                                                        "pk_classic",
+                                                        "pk_2",
+                                                        "diameter_power_relations",
+                                                        "hillman_threshold",
+                                                        "principal_direction_extents",
+                                                        "principal_direction_extents_2",
+                                                        "principal_direction_extents_3"});
+
+// What else changes when it lies turned about the direction of the pia.
+constexpr auto turned =
+    std::to_array<std::string_view>({"total_width", "total_depth", "circularity", "shape_factor",
+                                     "fractal_dimension_boxes", "trunk_vectors_x", "trunk_vectors_z",
+                                     "trunk_origin_azimuths", "trunk_origin_elevations", "trunk_angles"});
 
 // What one number tells better than a forest among all others, of what is measured together first: whether cells are too deep (a plane
 // has two directions to turn a neuron in, so that lengths along one of them are what lengths along z can be measured by), and whether
@@ -104,7 +101,7 @@ bool listed(std::span<const std::string_view> names, const Metric& m) {
 std::vector<Feature> columns_of(const Metric& m, const std::string& group) {
   const auto column = [&](std::string_view part, std::string_view unit) {
     return Feature{fmt::format("{} {}{}{}", group, m.name, part.empty() ? "" : " ", part), std::string(unit),
-                   m.diameters, m.level == Level::point || listed(tracing, m) || listed(slopes, m),
+                   m.diameters, depends_on_points(m) || listed(turned, m) || listed(slopes, m),
                    listed(slopes, m)};
   };
   if (m.level == Level::neuron) return {column("", m.unit)};
@@ -148,6 +145,8 @@ bool same_column(const Eigen::MatrixXd& m, Eigen::Index a, Eigen::Index b) {
 }
 
 }  // namespace
+
+bool depends_on_points(const Metric& metric) { return metric.level == Level::point || listed(dense, metric); }
 
 std::vector<Group> groups_of(std::string_view word) {
   const KindSet chosen = kind_set(word);

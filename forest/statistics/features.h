@@ -16,6 +16,11 @@
 
 namespace forest::statistics {
 
+struct Metric;
+
+/// Whether its values change when the same cell is traced by more points.
+bool depends_on_points(const Metric& metric);
+
 struct Feature {
   std::string name;  // "basal contraction sd": group, metric, summary
   std::string unit;
