@@ -156,6 +156,11 @@ void Viewport::set_camera(const frame::Camera& camera) {
 }
 
 void Viewport::touch() {
+  moved_.restart();
+  draw_anew();
+}
+
+void Viewport::draw_anew() {
   stage_ = Stage::moving;
   rest_.start();
   update();
@@ -204,7 +209,7 @@ void Viewport::select(const std::optional<scene::Pick>& pick, std::optional<std:
   selected_synapse_ = pick ? synapse : std::nullopt;
   selection_ = pick ? std::optional(studio::select(forest_, *pick)) : std::nullopt;
   highlight_ = selection_ ? highlight(forest_, *selection_) : std::vector<frame::Overlay>{};
-  touch();
+  draw_anew();
   Q_EMIT selected();
 }
 
@@ -281,7 +286,7 @@ scene::ActivityView Viewport::activity() const {
 
 void Viewport::change(const scene::ActivityView& activity) {
   settings_.view.activity = activity;
-  touch();
+  draw_anew();
   Q_EMIT changed();
 }
 
@@ -293,7 +298,7 @@ void Viewport::set_time(double milliseconds) {
   shown.time = std::clamp(milliseconds, playback_->begin(), playback_->end());
   settings_.view.activity = shown;
   window_ = 0.;
-  touch();
+  draw_anew();
   Q_EMIT moved();
 }
 
@@ -301,7 +306,7 @@ void Viewport::set_playing(bool playing) {
   playing_ = playing && playback_;
   tick_.restart();
   window_ = 0.;
-  touch();
+  draw_anew();
   Q_EMIT moved();
 }
 
@@ -541,8 +546,13 @@ void Viewport::draw_part(const scene::View& of, std::uint32_t first, std::uint32
 
 bool Viewport::layered(const scene::View& view) const { return processor_ && scene::layered(view); }
 
-void Viewport::draw_moving() {
-  const scene::View view = scene::within(settings_.view, budget());
+scene::Budget& Viewport::budget() {
+  if (moved_.hasExpired(rest_milliseconds)) return standing_budget_;
+  return processor_ && settings_.view.detail.gaze ? gaze_budget_ : budget_;
+}
+
+void Viewport::draw_moving(const scene::Budget& budget) {
+  const scene::View view = scene::within(settings_.view, budget);
   // What is not there yet is made once the view stands still.
   draw_part(view, 0, view.samples, {.skin = {.new_pieces = 0}, .synapses = moving_synapses});
 }
@@ -568,8 +578,8 @@ void Viewport::refine() {
   if (refined_ == samples) stage_ = Stage::finished;
 }
 
-void Viewport::took(float milliseconds) {
-  budget().took(double(milliseconds), figures_.segments);
+void Viewport::took(float milliseconds, scene::Budget& budget) {
+  budget.took(double(milliseconds), figures_.segments);
   milliseconds_ = milliseconds_ > 0.f ? .8f * milliseconds_ + .2f * milliseconds : milliseconds;
   figures_.frames_per_second = 1000.f / milliseconds_;
 }
@@ -582,8 +592,9 @@ void Viewport::paintGL() {
   try {
     QElapsedTimer clock;
     clock.start();
-    const float softness = budget().softness();  // of what is drawn now
-    if (stage == Stage::moving) draw_moving();
+    scene::Budget& budget = this->budget();
+    const float softness = budget.softness();  // of what is drawn now
+    if (stage == Stage::moving) draw_moving(budget);
     if (stage == Stage::refining) refine();
     QOpenGLFunctions* gl = context()->functions();
     gl->glDisable(GL_SCISSOR_TEST);
@@ -595,7 +606,7 @@ void Viewport::paintGL() {
     gl->glClear(GL_COLOR_BUFFER_BIT);
     gl->glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
     annotate();
-    if (stage == Stage::moving && --warming_up_ < 0) took(float(clock.nsecsElapsed()) * 1e-6f);
+    if (stage == Stage::moving && --warming_up_ < 0) took(float(clock.nsecsElapsed()) * 1e-6f, budget);
   } catch (const std::exception& error) {
     // All that is drawn was checked when it was opened, but for values of a simulation, which are as they are read.
     if (playback_ && dynamic_cast<const InputError*>(&error))

@@ -146,6 +146,7 @@ class Viewport final : public QOpenGLWidget {
 
   void set_camera(const frame::Camera& camera);
   void touch();                 // something changed: draw, and refine once it stands still
+  void draw_anew();             // the same where nothing moved, but what is shown on the branches changed
   void advance(float seconds);  // glide and flight
   void glide_on();
   /// Where the wheel goes: what was under the mouse as it began to turn; none where nothing is.
@@ -154,7 +155,7 @@ class Viewport final : public QOpenGLWidget {
   void release();        // what lies in the current context
   void recover(const std::string& why);
   bool flies() const { return !held_.empty(); }
-  void draw_moving();
+  void draw_moving(const scene::Budget& budget);
   void draw_still(std::uint32_t samples, std::uint32_t first, std::uint32_t last,
                   const DressingLimits& limits = {});
   void draw_part(const scene::View& view, std::uint32_t first, std::uint32_t last,
@@ -165,12 +166,12 @@ class Viewport final : public QOpenGLWidget {
                                        const scene::Chooser::Painter& painter) const;
   std::uint32_t samples_at_rest() const;
   void refine();
-  void took(float milliseconds);
+  void took(float milliseconds, scene::Budget& budget);
   void paint(const frame::Image& drawn, float softness);
   std::vector<scene::LegendEntry> legend() const;
   void annotate();
   bool layered(const scene::View& view) const;  // drawn layer by layer
-  scene::Budget& budget() { return processor_ && settings_.view.detail.gaze ? gaze_budget_ : budget_; }
+  scene::Budget& budget();                      // of the picture that is to be drawn now
   frame::Viewport in_points() const { return {float(width()), float(height())}; }
 
   scene::Forest forest_;
@@ -202,11 +203,13 @@ class Viewport final : public QOpenGLWidget {
   float sample_milliseconds_ = 20.f;
   float milliseconds_ = 0.f;  // of a moving picture, smoothed
   frame::Image softened_;
-  scene::Budget budget_, gaze_budget_{scene::Budget::with_gaze};  // of a moving picture
+  scene::Budget budget_, gaze_budget_{scene::Budget::with_gaze};  // of a moving picture …
+  scene::Budget standing_budget_ = scene::Budget::standing();     // … and of one in which only time goes on
   int warming_up_ = 2;  // the first pictures make programs and buffers: they are no measure
   Figures figures_;
-  QTimer rest_;         // runs out when the view has stood still
-  QElapsedTimer tick_;  // since the last step of flight
+  QTimer rest_;          // runs out when the picture has stood still
+  QElapsedTimer moved_;  // since the view moved
+  QElapsedTimer tick_;   // since the last step of flight
   std::optional<Glide> glide_;
   bool loop_ = false;
   struct Approach {

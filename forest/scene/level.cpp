@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "forest/core/clones.h"
 
@@ -129,6 +130,9 @@ constexpr std::array<Step, 6> steps{{{2.8f, 1, 3.f, 6.f, 4.f, 4.f, 2, 1.3, .2f},
                                      {1.f, 4, .5f, 5.f, 4.f, 2.f, 1, 1.3, .06f},
                                      {1.f, 16, .5f, 3.f, 1.f, 1.f, 1, 1., 0.f}}};
 
+/// How many times longer a picture takes with a finer error, roughly: what does not depend on it is a part of its time.
+double finer(float error, float to) { return std::sqrt(double(error) / double(to)); }
+
 }  // namespace
 
 float Budget::pixel() const { return steps[step_].pixel; }
@@ -139,52 +143,80 @@ float Budget::thinnest() const {
 std::uint32_t Budget::turns() const { return steps[step_].turns; }
 float Budget::softness() const { return steps[step_].softness; }
 
-// The highest step for which a picture of the present one at its finest leaves time; from large pixels one at a time, as those
-// of the next have much detail to gain.
-std::size_t Budget::upwards(double milliseconds) const {
-  std::size_t to = step_;
-  const std::size_t highest = step_ < plain_step ? step_ + 1 : doubt_.size();
-  for (std::size_t i = step_; i < highest; ++i) {
-    milliseconds *= steps[i].longer * doubt_[i];
-    if (milliseconds < milliseconds_) to = i + 1;
+Budget Budget::standing() {
+  Budget budget(80.);
+  budget.go_to(steps.size() - 1, 1.f);
+  return budget;
+}
+
+// Of the last pictures that were drawn so.
+double Budget::median(std::size_t last) const {
+  auto times = times_;
+  last = std::min(last, drawn_);
+  const auto middle = times.begin() + std::ptrdiff_t(last / 2);
+  std::nth_element(times.begin(), middle, times.begin() + std::ptrdiff_t(last));
+  return *middle;
+}
+
+void Budget::go_to(std::size_t step, float error) {
+  if (step == step_ && std::abs(error / error_ - 1.f) < .05f) return;
+  step_ = step, error_ = error, drawn_ = 0;
+}
+
+// As the table has it, or as it was found.
+double Budget::longer(std::size_t step) const { return std::max(longer_[step], steps[step].longer); }
+
+// The highest step that there is time for, and the share of it that its first picture will take, where one of the present step at
+// its finest takes that share.
+std::pair<std::size_t, double> Budget::upwards(double share) const {
+  std::pair to(step_, share);
+  for (std::size_t i = step_; i < longer_.size(); ++i) {
+    share *= longer(i);
+    if (share < 1.) to = {i + 1, share};
+    share *= finer(steps[i + 1].from_below, steps[i + 1].finest);
   }
   return to;
 }
 
 void Budget::took(double milliseconds, std::uint64_t segments) {
-  // Changing back and forth would be seen, so several pictures must agree, for more samples those of a second and a half: a gaze
-  // that jumps rests beside the forest for less. What was left again soon was tried in vain, and is not tried again so soon;
-  // that is forgotten in a minute.
-  constexpr std::uint32_t several = 3;
-  constexpr double long_enough = 1500.;  // milliseconds
-  constexpr double most_doubt = 8., fading = .999;
-  for (double& doubt : doubt_) doubt = std::max(1., fading * doubt);
-  ++since_;
+  // Of the last pictures five tell that much is wrong, and nine that a little is. What cannot be afforded is left at once. What is gone
+  // back to too early is seen twice, so there must have been time for it for half a second, at sixty pictures a second; what a
+  // step was found to take is forgotten in a minute.
+  constexpr std::size_t least = 3, some = 5;
+  constexpr double too_long = 1.15, much_too_long = 1.4, quick = .85;  // shares of the time there is
+  constexpr double patience = 840., most_longer = 3., fading = .9995;
+  constexpr std::uint64_t few = 40'000;  // two cores draw them in three milliseconds
+  for (double& longer : longer_) longer *= fading;
+  std::shift_right(times_.begin(), times_.end(), 1);
+  times_[0] = milliseconds;
+  if (++drawn_ < least) return;
   const Step& now = steps[step_];
-  constexpr std::uint64_t few = 20'000;  // two cores draw them in a millisecond or two
-  const bool of_few = samples() == 1 && segments < few;
-  const bool too_long = step_ > 0 && !of_few && error_ >= now.coarsest && milliseconds > 1.1 * milliseconds_;
-  const std::size_t above = error_ > now.finest            ? step_
-                            : of_few && step_ < plain_step ? plain_step
-                                                           : upwards(milliseconds);
-  agreed_ = too_long || above > step_ ? agreed_ + 1 : 0;
-  if (agreed_ >= several && too_long) {
-    --step_, error_ = steps[step_].from_above, agreed_ = 0;
-    if (since_ * milliseconds_ < long_enough) doubt_[step_] = std::min(2. * doubt_[step_], most_doubt);
+  const double lately = median(some) / milliseconds_, at_finest = lately * finer(error_, now.finest);
+  if (const auto expected = std::exchange(expected_, {}))
+    longer_[step_ - 1] = std::min(longer(step_ - 1) * lately / *expected, most_longer);
+
+  const bool of_few = samples() == 1 && 2 * segments < few;
+  calm_ = of_few || lately < quick ? calm_ + milliseconds_ : 0.;
+  if (calm_ > 0.) {
+    if (calm_ < patience) return;
+    if (error_ > now.finest)
+      return go_to(step_, std::max(now.finest, error_ * float(of_few ? .25 : std::max(lately, .25))));
+    const auto [above, expected] =
+        of_few && step_ < plain_step ? std::pair(plain_step, lately) : upwards(at_finest);
+    if (above > step_) go_to(above, steps[above].from_below), expected_ = expected;
     return;
   }
-  if (agreed_ >= several && agreed_ * milliseconds_ >= long_enough) {
-    step_ = above, error_ = steps[step_].from_below, agreed_ = since_ = 0;
-    return;
-  }
-  // The first picture of a large forest may take long. One alone that does, or does not, may be the machine's doing: of two, what
-  // both say.
-  const double most = of_few ? .8 : 16.;
-  const auto [quicker, slower] = std::minmax({milliseconds, before_.value_or(milliseconds)});
-  const double steady = std::clamp(milliseconds_, quicker, slower);
-  before_ = milliseconds;
-  const double ratio = std::clamp(steady / milliseconds_, .5, most);
-  error_ = std::clamp(error_ * float(std::sqrt(ratio)), now.finest, now.coarsest);
+
+  const double by_all = drawn_ < times_.size() ? 1. : median(times_.size()) / milliseconds_,
+               share = lately > much_too_long ? lately : by_all;
+  if (share <= too_long) return;
+  const float fitting = error_ * float(share),
+              room = error_ * std::max(1.f, float(segments) / float(few)),  // until there are few
+      coarsest = std::min(now.coarsest, room);
+  if (step_ == 0 || fitting <= 1.1f * coarsest || (samples() == 1 && room < now.coarsest))
+    return go_to(step_, std::min(fitting, coarsest));
+  const Step& below = steps[step_ - 1];
+  go_to(step_ - 1, std::min(below.from_above, std::max(below.finest, room)));
 }
 
 }  // namespace forest::scene

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "forest/frame/camera.h"
 #include "forest/scene/seen.h"
@@ -155,8 +156,12 @@ class Eye {
 };
 
 /// A frame-time budget that moves the detail of pictures that follow one another: as many samples a pixel as there is time for,
-/// larger pixels where there is no time for one, and within them the acceptable error, which pictures that took too long make
+/// larger pixels where there is no time for one, and within them the acceptable error, which pictures that take too long make
 /// larger and quick ones smaller.
+///
+/// Detail that comes and goes is seen more than detail that is not there. So what the last few pictures took is judged by its median,
+/// which no single one moves, nothing changes while that is about right, and what was changed is looked at anew before it is
+/// changed again.
 class Budget {
  public:
   /// What a picture may take where nobody says otherwise, milliseconds: in the studio and in what measures it.
@@ -165,6 +170,9 @@ class Budget {
   static constexpr double with_gaze = 15.;
 
   explicit Budget(double milliseconds = usual) : milliseconds_(milliseconds) {}
+  /// For a view that stands still while what is on its branches changes: it begins as the view was seen at rest, and takes its time,
+  /// for fewer pictures a second are seen less than thin branches that go and come back.
+  static Budget standing();
   double milliseconds() const { return milliseconds_; }  // that a picture may take
   std::uint32_t samples() const;
   /// As Detail::pixel.
@@ -184,15 +192,19 @@ class Budget {
   static constexpr std::uint64_t all = ~std::uint64_t(0);
   static constexpr std::size_t plain_step = 3;  // one sample of every pixel
 
-  std::size_t upwards(double milliseconds) const;
+  double median(std::size_t last) const;
+  void go_to(std::size_t step, float error);
+  double longer(std::size_t step) const;
+  std::pair<std::size_t, double> upwards(double share) const;
 
   double milliseconds_;
   std::size_t step_ = plain_step;
   float error_ = 1.f;
-  std::array<double, 5> doubt_{1., 1., 1., 1., 1.};  // of each step but the last: the next was tried in vain
-  std::uint32_t agreed_ = 0;                         // pictures that have asked for another step
-  std::uint32_t since_ = 0;                          // pictures since the step was gone up to
-  std::optional<double> before_;                     // milliseconds that the picture before took
+  std::array<double, 9> times_{};   // milliseconds of the last pictures of this step and error, …
+  std::size_t drawn_ = 0;           // … of which there were so many; the last first
+  double calm_ = 0.;                // pictures have been quick for so many milliseconds
+  std::array<double, 5> longer_{};  // times that a picture of the next step took when it was tried; fades
+  std::optional<double> expected_;  // share of the time that the step should take which was just gone up to
 };
 
 }  // namespace forest::scene
