@@ -50,6 +50,8 @@ constexpr Measure measures[] = {
     {"jacobian", "scaled Jacobian, the least", "scaled Jacobian",
      [](const Elements& all, std::size_t e) { return cortex::scaled_jacobian(all.hexahedron(e)); }},
     {"equivolume", "largest |V(0 → depth)/V − depth|", "equivolume error", cortex::depth_error},
+    {"bulge", "mm that layers bulge in the middle, at most", "bulge of layers (mm)",
+     [](const Elements& all, std::size_t e) { return cortex::layer_bulge(all, e) / 1e3; }},
 };
 
 // Of each element where its middle is, µm, as `plant --near` takes it, and all that is measured.

@@ -313,6 +313,20 @@ double depth_error(const Elements& elements, std::size_t element) {
   return DepthError(elements.hexahedron(element), 24)(Layers(elements, element)).largest;
 }
 
+double layer_bulge(const Elements& elements, std::size_t element) {
+  const Hexahedron h = elements.hexahedron(element);
+  const Layers layers(elements, element);
+  double most = 0.;
+  for (int k = 1; k < steps; ++k) {
+    const double depth = double(k) / steps;
+    double by_corners = 0.;
+    for (const double u : {0., 1.})
+      for (const double v : {0., 1.}) by_corners += .25 * layers.w(u, v, depth);
+    most = std::max(most, (h.at(.5, .5, layers.w(.5, .5, depth)) - h.at(.5, .5, by_corners)).norm());
+  }
+  return most;
+}
+
 namespace {
 
 // Tables are exact at their depths; where w leaps from one to the next it is not between them. Such an element's own table is changed

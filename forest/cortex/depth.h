@@ -59,4 +59,7 @@ class Layers {
 /// The largest |V(0 → depth) / V − depth| of an element, over 23 depths, three of which its tables know.
 double depth_error(const Elements& elements, std::size_t element);
 
+/// How far in the middle of an element, at most, its own table carries a depth, µm: by so much its layers bulge between its corners.
+double layer_bulge(const Elements& elements, std::size_t element);
+
 }  // namespace forest::cortex

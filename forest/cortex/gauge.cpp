@@ -24,10 +24,10 @@ FOREST_INLINE void root(Lanes& x) {
 }
 
 // By the four places of a line, the place and the slope of the cubic through them at each sample; and of the volume, what det J there
-// counts (Boole's rule).
+// counts (Boole's rule), and how far it is from the middle.
 template <int samples>
 struct Line {
-  float value[samples][4], slope[samples][4], share[samples];
+  float value[samples][4], slope[samples][4], share[samples], lever[samples];
 };
 template <int samples>
 constexpr Line<samples> make_line() {
@@ -36,8 +36,9 @@ constexpr Line<samples> make_line() {
   for (int s = 0; s < samples; ++s) {
     constexpr int parts = (samples - 1) / 4;
     line.share[s] = float(boole[s % 4] / (s == 0 || s == samples - 1 ? 2. * parts : double(parts)));
+    const double t = double(s) / (samples - 1);
+    line.lever[s] = float(1. - 2. * t);
     for (int m = 0; m < 4; ++m) {
-      const double t = double(s) / (samples - 1);
       double under = 1., value = 1., slope = 0.;
       for (int n = 0; n < 4; ++n)
         if (n != m) under *= double(m - n) / 3., value *= t - double(n) / 3.;
@@ -141,7 +142,7 @@ FOREST_INLINE void look_by(const Places& places, Shape& shape) {
   AlongW<samples> along;
   go_along_w<samples>(places, along);
   Row<samples> j;
-  Lanes least = Lanes{} + 1.f, volume{};
+  Lanes least = Lanes{} + 1.f, volume{}, tilt{};
   for (int at_w = 0; at_w < samples; ++at_w)
     for (int at_v = 0; at_v < samples; ++at_v) {
       go_along_u<samples>(along, at_w, at_v, j);
@@ -155,20 +156,22 @@ FOREST_INLINE void look_by(const Places& places, Shape& shape) {
         root(lengths);
         const Lanes scaled = det / lengths;
         least = scaled < least ? scaled : least;
-        volume += share * line<samples>.share[s] * det;
+        const Lanes part = share * line<samples>.share[s] * det;
+        volume += part, tilt += line<samples>.lever[at_w] * part;
       }
     }
-  shape.least = least, shape.volume = volume;
+  shape.least = least, shape.volume = volume, shape.tilt = tilt;
 }
 
 template <int samples>
-FOREST_INLINE void weigh_by(const Places& places, const Wanted& wanted, const Lanes& by_volume, Lack& lack) {
+FOREST_INLINE void weigh_by(const Places& places, const Wanted& wanted, const Counts& counts, Lack& lack) {
   AlongW<samples> along, back{};
   go_along_w<samples>(places, along);
   Row<samples> j;
   const float fold = wanted.fold * wanted.fold;
   Lanes value{};
-  for (int at_w = 0; at_w < samples; ++at_w)
+  for (int at_w = 0; at_w < samples; ++at_w) {
+    const Lanes by_part = counts.volume + line<samples>.lever[at_w] * counts.tilt;
     for (int at_v = 0; at_v < samples; ++at_v) {
       go_along_u<samples>(along, at_w, at_v, j);
       const float share = line<samples>.share[at_w] * line<samples>.share[at_v];
@@ -190,7 +193,7 @@ FOREST_INLINE void weigh_by(const Places& places, const Wanted& wanted, const La
         const Lanes by_chi = scaled > 0.f ? 2.f / sum : (2.f / fold) * sum;
         value += short_of * short_of * by_chi;
         const Lanes fall = (2.f * short_of + short_of * short_of / soft) * by_chi;
-        const Lanes by_det = by_volume * (share * line<samples>.share[s]) - fall * by_lengths,
+        const Lanes by_det = by_part * (share * line<samples>.share[s]) - fall * by_lengths,
                     by_square = fall * scaled * by_lengths * by_lengths;
         const Lanes u = by_square * vv * ww, v = by_square * uu * ww, w = by_square * uu * vv;
         j[0][0][s] = by_det * by_ux + u * ux, j[0][1][s] = by_det * by_uy + u * uy,
@@ -204,18 +207,18 @@ FOREST_INLINE void weigh_by(const Places& places, const Wanted& wanted, const La
       }
       back_along_u<samples>(j, at_w, at_v, back);
     }
+  }
   lack.value = value;
   back_along_w<samples>(back, lack.gradient);
 }
 
 FOREST_CLONES void look_few(const Places& places, Shape& shape) { look_by<5>(places, shape); }
 FOREST_CLONES void look_many(const Places& places, Shape& shape) { look_by<9>(places, shape); }
-FOREST_CLONES void weigh_few(const Places& places, const Wanted& wanted, const Lanes& by_volume, Lack& lack) {
-  weigh_by<5>(places, wanted, by_volume, lack);
+FOREST_CLONES void weigh_few(const Places& places, const Wanted& wanted, const Counts& counts, Lack& lack) {
+  weigh_by<5>(places, wanted, counts, lack);
 }
-FOREST_CLONES void weigh_many(const Places& places, const Wanted& wanted, const Lanes& by_volume,
-                              Lack& lack) {
-  weigh_by<9>(places, wanted, by_volume, lack);
+FOREST_CLONES void weigh_many(const Places& places, const Wanted& wanted, const Counts& counts, Lack& lack) {
+  weigh_by<9>(places, wanted, counts, lack);
 }
 
 }  // namespace
@@ -234,7 +237,7 @@ Batch batch_of(const Elements& elements, std::span<const std::uint32_t> list) {
 }
 
 Looks look(const Elements& elements, std::span<const std::uint32_t> of) {
-  Looks looks{std::vector<float>(of.size()), std::vector<float>(of.size())};
+  Looks looks{std::vector<float>(of.size()), std::vector<float>(of.size()), std::vector<float>(of.size())};
   constexpr std::size_t at_once = lanes, grain = 32;
   parallel_for((of.size() + at_once - 1) / at_once, grain, [&](std::size_t i) {
     const auto list = of.subspan(at_once * i);
@@ -242,6 +245,7 @@ Looks look(const Elements& elements, std::span<const std::uint32_t> of) {
     for (std::size_t lane = 0; lane < std::min(at_once, list.size()); ++lane) {
       looks.least[at_once * i + lane] = shape.least[lane];
       looks.volume[at_once * i + lane] = shape.volume[lane];
+      looks.tilt[at_once * i + lane] = shape.tilt[lane];
     }
   });
   return looks;
@@ -259,8 +263,8 @@ Shape look(const Batch& batch, Samples samples) {
   return shape;
 }
 
-void weigh(const Batch& batch, Samples samples, const Wanted& wanted, const Lanes& by_volume, Lack& lack) {
-  (samples == Samples::few ? weigh_few : weigh_many)(batch.at(), wanted, by_volume, lack);
+void weigh(const Batch& batch, Samples samples, const Wanted& wanted, const Counts& counts, Lack& lack) {
+  (samples == Samples::few ? weigh_few : weigh_many)(batch.at(), wanted, counts, lack);
 }
 
 }  // namespace forest::cortex

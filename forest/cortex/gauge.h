@@ -48,12 +48,13 @@ enum class Samples : unsigned char { few, many };
 struct Shape {
   Lanes least;   // scaled Jacobian (see Hexahedron)
   Lanes volume;  // µm³, by Boole's rule
+  Lanes tilt;    // ∫ (1 − 2 w) dV, likewise: above 0 if it is wider outside than inside
 };
 Shape look(const Batch& batch, Samples samples);
 
 /// Of each of some elements, or of all of them, at few places.
 struct Looks {
-  std::vector<float> least, volume;
+  std::vector<float> least, volume, tilt;
 };
 Looks look(const Elements& elements, std::span<const std::uint32_t> of);
 Looks look(const Elements& elements);
@@ -64,9 +65,11 @@ struct Wanted {
 };
 struct Lack {
   Lanes value;  // Σ (wanted − s)² / χ(s) over places where s is less; χ is s well above 0, and never 0
-  Lanes gradient[3][64];  // of that and of the volume times `by_volume`, by the coordinates of places
+  Lanes gradient[3][64];  // of that and of what `counts`, by the coordinates of places
 };
-/// @param by_volume  what a µm³ more of each counts
-void weigh(const Batch& batch, Samples samples, const Wanted& wanted, const Lanes& by_volume, Lack& lack);
+struct Counts {
+  Lanes volume, tilt;  // what a µm³ more of each counts
+};
+void weigh(const Batch& batch, Samples samples, const Wanted& wanted, const Counts& counts, Lack& lack);
 
 }  // namespace forest::cortex

@@ -36,6 +36,15 @@ Batch batch(double by) {
   return result;
 }
 
+// How much more of it lies above than below, by slices.
+double tilt(const Hexahedron& h) {
+  constexpr int slices = 32;
+  double sum = 0.;
+  for (int i = 0; i < slices; ++i)
+    sum += (1. - (2. * i + 1.) / slices) * h.volume(double(i) / slices, (i + 1.) / slices);
+  return sum;
+}
+
 TEST(Gauge, ShapesAreThoseOfTheElements) {
   const Batch eight = batch(150.);
   const Shape few = look(eight, Samples::few), many = look(eight, Samples::many);
@@ -44,6 +53,7 @@ TEST(Gauge, ShapesAreThoseOfTheElements) {
     EXPECT_NEAR(few.least[lane], scaled_jacobian(h, 4), 5e-4);
     EXPECT_NEAR(many.least[lane], scaled_jacobian(h, 8), 5e-4);  // nor are lengths quite those
     EXPECT_NEAR(many.volume[lane] / h.volume(), 1., 1e-3);       // Boole's rule is not exact
+    EXPECT_NEAR((many.tilt[lane] - tilt(h)) / h.volume(), 0., 1e-3);
     EXPECT_LE(many.least[lane], few.least[lane]);
   }
 }
@@ -52,11 +62,11 @@ TEST(Gauge, AnElementIsTheSameInEveryLane) {
   const Batch mixed = batch(300.);
   Batch alike;
   for (int lane = 0; lane < lanes; ++lane) alike.set(lane, crumpled(3, 300.));
-  const Lanes by_volume = Lanes{} + 1e-9f;
+  const Counts counts{Lanes{} + 1e-9f, Lanes{} + 2e-9f};
   for (const Samples samples : {Samples::few, Samples::many}) {
     Lack a, b;
-    weigh(mixed, samples, {.65f, .02f}, by_volume, a);
-    weigh(alike, samples, {.65f, .02f}, by_volume, b);
+    weigh(mixed, samples, {.65f, .02f}, counts, a);
+    weigh(alike, samples, {.65f, .02f}, counts, b);
     for (int lane = 0; lane < lanes; ++lane) {
       EXPECT_EQ(a.value[3], b.value[lane]);
       for (int p = 0; p < 64; ++p) EXPECT_EQ(a.gradient[1][p][3], b.gradient[1][p][lane]);
@@ -83,12 +93,17 @@ TEST(Gauge, WhatIsLackingAndHowItFalls) {
   for (const double by : {200., 700.})  // valid, and folded
     for (const Samples samples : {Samples::few, Samples::many}) {
       const int steps = samples == Samples::few ? 4 : 8;
-      constexpr double wanted = .65, fold = .1, by_volume = 3e-8;
+      constexpr double wanted = .65, fold = .1, by_volume = 3e-8, by_tilt = -2e-8;
       Lack lacking;
-      weigh(batch(by), samples, {float(wanted), float(fold)}, Lanes{} + float(by_volume), lacking);
+      weigh(batch(by), samples, {float(wanted), float(fold)},
+            {Lanes{} + float(by_volume), Lanes{} + float(by_tilt)}, lacking);
       for (int lane = 0; lane < lanes; lane += 3) {
         Places places = crumpled(lane, by);
         const auto value = [&] { return lack(element(places), steps, wanted, fold); };
+        const auto all = [&] {
+          const Hexahedron h = element(places);
+          return value() + by_volume * h.volume() + by_tilt * tilt(h);
+        };
         const double now = value();
         ASSERT_GT(now, 0.);
         EXPECT_NEAR(lacking.value[lane] / now, 1., 1e-3);
@@ -101,9 +116,9 @@ TEST(Gauge, WhatIsLackingAndHowItFalls) {
             constexpr double step = .01;
             const double before = places(one, p);
             places(one, p) = before + step;
-            const double up = value() + by_volume * element(places).volume();
+            const double up = all();
             places(one, p) = before - step;
-            const double down = value() + by_volume * element(places).volume();
+            const double down = all();
             places(one, p) = before;
             EXPECT_NEAR(lacking.gradient[one][p][lane], (up - down) / (2. * step), .01 * largest);
           }

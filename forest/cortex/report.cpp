@@ -33,7 +33,7 @@ Report report(const Cortex& cortex, double wanted, const TriangleTree* outer, co
   Report result;
   result.elements = n;
   if (n == 0) return result;
-  std::vector<double> volumes(n), equivolume(n), jacobian(n);
+  std::vector<double> volumes(n), equivolume(n), bulge(n), jacobian(n);
   std::vector<std::uint8_t> bad(n);
   progress.begin("measuring elements", n);
   parallel_ranges(n, 64, [&](std::size_t begin, std::size_t end) {
@@ -42,6 +42,7 @@ Report report(const Cortex& cortex, double wanted, const TriangleTree* outer, co
       bad[e] = !certify(h).positive();
       volumes[e] = h.volume();
       equivolume[e] = depth_error(elements, e);
+      bulge[e] = layer_bulge(elements, e);
       jacobian[e] = scaled_jacobian(h);
     }
     progress.advance(end - begin);
@@ -58,6 +59,8 @@ Report report(const Cortex& cortex, double wanted, const TriangleTree* outer, co
       cortex.between > 0. ? std::abs(total + cortex.wall - cortex.between) / cortex.between : 0.;
   result.equivolume_error = *std::max_element(equivolume.begin(), equivolume.end());
   result.equivolume_p99 = share_of(equivolume, .99);
+  result.bulge_most = *std::max_element(bulge.begin(), bulge.end());
+  result.bulge_p99 = share_of(bulge, .99);
   result.jacobian_least = *std::min_element(jacobian.begin(), jacobian.end());
   result.jacobian_p1 = share_of(jacobian, .01);
   if (outer) result.outer = face_distance(elements, 0., *outer);

@@ -28,8 +28,9 @@ struct Report {
   double volume_error = 0.;   // of elements and wall together, as a share of what lies between the surfaces
   double volume_mean = 0.;    // µm³
   double volume_within = 0.;  // share of elements that are as_wanted
-  double equivolume_error = 0.;  // the largest |V(0 → w) / V − w| of any element
-  double equivolume_p99 = 0.;    // and of 99 of 100 elements
+  double equivolume_error = 0.;            // the largest |V(0 → w) / V − w| of any element
+  double equivolume_p99 = 0.;              // and of 99 of 100 elements
+  double bulge_p99 = 0., bulge_most = 0.;  // layer_bulge, µm
   double jacobian_least = 0.,
          jacobian_p1 = 0.;  // scaled Jacobian: the least of each element over a lattice of places
   std::optional<Spread>

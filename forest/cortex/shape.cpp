@@ -35,6 +35,12 @@ struct HeldFace {
 
 constexpr double farthest_way = 1000.;  // µm, that a place may move at once: not to another bank
 constexpr double very_bad = .6;         // so much of a good enough scaled Jacobian
+constexpr double level_enough = .004;   // of a volume, that more lies above than is wanted
+
+// What a number lacks or has too much of.
+constexpr double beyond(double low, double high, double x) {
+  return std::max(0., x - high) - std::max(0., low - x);
+}
 
 // What is shaped at once: badly shaped elements that touch one another, all whose curves may move, and all that see these.
 struct Patch {
@@ -72,6 +78,25 @@ std::vector<std::vector<Patch>> patches(const Elements& elements, const Stars& s
   return turns;
 }
 
+// How much more of some elements should lie above than below, as a share of their volume: as much as of those around them, on the mean.
+std::vector<float> wanted_tilts(const Elements& elements, const Stars& stars, const List& list) {
+  constexpr float most = .5f;  // twice what a wedge has
+  std::vector<float> own(elements.size(), 0.f), wanted(own);
+  std::vector<std::uint8_t> known(elements.size(), 0);
+  const List around = widened(elements, stars, list);
+  const Looks looks = look(elements, around);
+  for (std::size_t i = 0; i < around.size(); ++i)
+    if (looks.least[i] > 0.f)
+      known[around[i]] = 1, own[around[i]] = std::clamp(looks.tilt[i] / looks.volume[i], -most, most);
+  parallel_for(list.size(), 64, [&](std::size_t i) {
+    float sum = 0.f, count = 0.f;
+    for (const std::uint32_t e : widened(elements, stars, std::span(&list[i], 1)))
+      if (known[e]) sum += own[e], count += 1.f;
+    wanted[list[i]] = count > 0.f ? sum / count : 0.f;
+  });
+  return wanted;
+}
+
 // One patch while it is shaped.
 class Work {
  public:
@@ -79,7 +104,8 @@ class Work {
 
   using Held = std::vector<std::array<HeldFace, 2>>;  // of every element seen, outer and inner; or none
 
-  Work(Elements& elements, const Patch& patch, const Shaping& shaping, Anchors anchors, Held held)
+  Work(Elements& elements, const Patch& patch, const Shaping& shaping, const std::vector<float>& tilts,
+       Anchors anchors, Held held)
       : elements_(elements),
         patch_(patch),
         shaping_(shaping),
@@ -91,7 +117,7 @@ class Work {
         before_.segment<3>(Eigen::Index(12 * i + 3 * d)) = elements.curves[patch.curves[i]][d];
     for (const std::uint32_t e : patch.seen) {
       const bool valid = proven(e);
-      Seen own{e, {}, valid, shaping.finely || !valid, true};
+      Seen own{e, {}, double(tilts[e]), valid, shaping.finely || !valid, true};
       for (std::size_t c = 0; c < 16; ++c) {
         const auto at = std::ranges::lower_bound(patch.curves, elements.elements[e][c]);
         own.moving[c] =
@@ -148,6 +174,7 @@ class Work {
   struct Seen {  // an element that sees the patch
     std::uint32_t element;
     std::array<int, 16> moving;  // for each of its curves which of the moving ones it is, or -1
+    double tilt;                 // wanted, of its volume
     bool valid;                  // proven to be, at first
     bool finely;                 // it may fold where few samples do not see it
     bool whole;                  // folded at no sample, which must stay so
@@ -206,19 +233,23 @@ class Work {
         each_moving(s, [&](int place, int k) { g.batch.move(lane, place, at.segment<3>(k)); });
       });
       const Shape shape = look(g.batch, g.samples);
-      Lanes by_volume{};
+      Counts counts{};
       bool folded = false, good = true;
       g.each([&](int lane, const Seen& s) {
         folded |= s.whole && shape.least[lane] <= 0.f;
         const double ratio = double(shape.volume[lane]) / shaping_.volume;
-        const double off = std::max(0., ratio - shaping_.most) - std::max(0., shaping_.least - ratio);
-        by_volume[lane] = float(2. * shaping_.even * off / shaping_.volume);
-        value += shaping_.even * off * off;
-        good = good && off == 0. && double(shape.least[lane]) >= shaping_.wanted;
+        const double off = beyond(shaping_.least, shaping_.most, ratio);
+        const double tilt =
+            beyond(-level_enough, level_enough, double(shape.tilt[lane]) / shaping_.volume - s.tilt * ratio);
+        counts.volume[lane] =
+            float(2. * (shaping_.even * off - shaping_.level * tilt * s.tilt) / shaping_.volume);
+        counts.tilt[lane] = float(2. * shaping_.level * tilt / shaping_.volume);
+        value += shaping_.even * off * off + shaping_.level * tilt * tilt;
+        good = good && off == 0. && tilt == 0. && double(shape.least[lane]) >= shaping_.wanted;
       });
       if (folded) return infinite;
       if (good) continue;
-      weigh(g.batch, g.samples, {float(shaping_.wanted), float(fold_)}, by_volume, lack_);
+      weigh(g.batch, g.samples, {float(shaping_.wanted), float(fold_)}, counts, lack_);
       g.each([&](int lane, const Seen& s) {
         value += double(lack_.value[lane]);
         each_moving(s, [&](int place, int k) {
@@ -293,7 +324,7 @@ class Shaper {
     });
   }
 
-  void operator()(const Patch& patch) const {
+  void operator()(const Patch& patch, const std::vector<float>& tilts) const {
     const List worst = shaping_.close > 0. ? List() : curves_of_worst(patch);
     Work::Anchors anchors(patch.curves.size());
     for (std::size_t i = 0; i < anchors.size(); ++i) {
@@ -304,7 +335,7 @@ class Shaper {
     }
     Work::Held held(shaping_.close > 0. ? patch.seen.size() : 0);
     for (std::size_t i = 0; i < held.size(); ++i) held[i] = {hold(patch.seen[i], 0), hold(patch.seen[i], 3)};
-    Work(elements_, patch, shaping_, std::move(anchors), std::move(held)).run();
+    Work(elements_, patch, shaping_, tilts, std::move(anchors), std::move(held)).run();
   }
 
  private:
@@ -374,13 +405,17 @@ void improve_shapes(Elements& elements, const SurfaceTrees& surfaces, const Shap
     for (std::uint32_t e = 0; e < elements.size(); ++e)
       if (worst[e]) moving.push_back(e);
     for (const std::uint32_t e : widened(elements, stars, moving, shaping.room)) bad[e] = 1;
+    List movable;
+    for (std::uint32_t e = 0; e < elements.size(); ++e)
+      if (bad[e]) movable.push_back(e);
+    const std::vector<float> tilts = wanted_tilts(elements, stars, widened(elements, stars, movable));
     const auto turns = patches(elements, stars, std::move(bad), std::size_t(shaping.patch));
     std::size_t count = 0;
     for (const auto& turn : turns) count += turn.size();
     progress.begin("shaping elements", count);
     for (const auto& turn : turns)
       parallel_for(turn.size(), 1, [&](std::size_t i) {
-        shape(turn[i]);
+        shape(turn[i], tilts);
         progress.advance();
       });
     progress.end();

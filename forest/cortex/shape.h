@@ -2,13 +2,16 @@
 // Elements whose parameters are nearly in one direction somewhere, or even turned inside out, get a better shape: all places of
 // their curves move, those on a surface along it, until
 //
-//     Σ max(0, wanted − s)² / χ(s)  +  even · Σ (volume beyond least … most)²  +  Σ (way / along)² / 100  +  Σ (distance / off)² / 100
+//     Σ max(0, wanted − s)² / χ(s)  +  even · Σ (volume beyond least … most)²  +  level · Σ (tilt)²
+//                                   +  Σ (way / along)² / 100  +  Σ (distance / off)² / 100
 //
 // is least. The first sum is over 5×5×5 places of each element, s is the scaled Jacobian there (Knupp 2000, "Achieving finite element
 // mesh quality via optimization of the Jacobian matrix norm and associated quantities. Part I", Int J Numer Meth Eng 48:401, of whose
 // measures this one is bounded and so can begin at folded elements), and χ(s) is s well above 0 and never 0, so that what is
-// nearly folded counts by far the most (gauge.h). The second is over elements, in wanted volumes; the third over places, and how far they
-// went; the last over places on a surface, and how far they are from it. What is well shaped stays where it is.
+// nearly folded counts by far the most (gauge.h). The second is over elements, in wanted volumes; so is the third, of how much more of an
+// element lies above its middle than below, beside the mean of those around it: where neighbours taper otherwise, layers bulge between
+// them (depth.h). The fourth is over places, and how far they went; the last over places on a surface, and how far they are from it.
+// What is well shaped stays where it is.
 // The last may be over 5×5 places of faces instead, since a face bulges between its curves: each is held to the plane nearest to it, the
 // less the farther that is beyond .1 mm, and not where it is beyond .3 mm or the other bank's.
 #pragma once
@@ -25,6 +28,7 @@ struct Shaping {
   double volume = 1e9;             // µm³
   double least = .85, most = 1.2;  // of it
   double even = 4.;                // what (a volume beyond these)² counts, in wanted volumes
+  double level = 30.;  // what (more above its middle than elements around have)² counts, likewise
   double along =
       400.;  // µm: as far, a place moves as gladly as it lets the Jacobian at one place fall short by a tenth
   double off = 25.;  // µm, likewise from a surface

@@ -104,6 +104,26 @@ TEST_F(Shapes, AnElementTooLargeGivesToItsNeighbours) {
   EXPECT_LT(slab.hexahedron(2 + 6 * 3).volume(), 1.25 * 5e8);
 }
 
+// Only the outer face is bad: what is mended there alone leaves elements that taper otherwise than those beside them.
+TEST_F(Shapes, LayersBulgeLessWhereElementsTaperAlike) {
+  push_middle(Place(400., 330., 0.));
+  const Elements straight = make_slab(6, [](const Place& p) { return p; });
+  for (std::size_t c = 0; c < slab.curves.size(); ++c)
+    for (const std::size_t d : {1u, 2u, 3u})
+      slab.curves[c][d] += (double(d) / 3.) * (straight.curves[c][d] - slab.curves[c][d]);
+  const auto bulge = [&](double level) {
+    Elements shaped = slab;
+    improve_shapes(shaped, {outer, inner}, {.volume = 5e8, .level = level}, Progress::none());
+    shaped.depth = even_depth(shaped, Progress::none());
+    double most = 0.;
+    for (std::size_t e = 0; e < shaped.size(); ++e) most = std::max(most, layer_bulge(shaped, e));
+    return most;
+  };
+  const double without = bulge(0.), with = bulge(30.);
+  EXPECT_GT(without, 50.);
+  EXPECT_LT(with, .5 * without);
+}
+
 // Bent around an axis far below or near: the more so, the faster the tissue narrows.
 Elements bent(double radius) {
   return make_slab(4, [radius](const Place& p) {
