@@ -68,6 +68,13 @@ void tell_gaps(const fs::path& folder, std::span<const NumberedFile> files, Cons
       folder.string(), files[at].file.filename().string(), files[at + 1].file.filename().string()));
 }
 
+// Reconstruct's µm are meant: cells in electron micrographs are no brains.
+void tell_small(const cortex::ContourStack& stack, const fs::path& path, Console& console) {
+  if (const std::string small = cortex::too_small_for_a_brain(stack);
+      !small.empty() && extension_of(path) != ".jser")
+    console.warn(path.string() + ": " + small);
+}
+
 constexpr double least_tolerance = 1e-4;  // mm
 
 // Which options said something of an input.
@@ -375,6 +382,7 @@ void run(const Options& options, Console& console) {
   if (!options.objects.empty()) stack = cortex::only(stack, options.objects);
   const std::string fault = cortex::fault_of(stack);
   if (!fault.empty()) throw Error(options.inputs.front().string() + ": " + fault);
+  if (surfaces.empty()) tell_small(stack, options.inputs.front(), console);
   cortex::FitSummary summary;
   if (!options.straight)
     stack = cortex::fitted(stack, {.tolerance = 1e3 * options.tolerance}, summary, console.progress());
@@ -489,6 +497,7 @@ std::function<void()> cortex_compare(CLI::App& command, Console& console) {
     if (!o->object.empty()) stack = cortex::only(stack, std::array{o->object});
     if (const std::string fault = cortex::fault_of_numbers(stack); !fault.empty())
       throw Error(o->file.string() + ": " + fault);
+    tell_small(stack, o->file, console);
     nlohmann::ordered_json rows = nlohmann::ordered_json::array();
     std::vector<std::vector<std::string>> table;
     const auto mm = [](double um) {

@@ -29,14 +29,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double no_tissue = .5;  // mm; shorter curves, as of the medial wall, count for nothing
-
 // What is known of a curve.
 struct Dropped {
   cortex::Place at = cortex::Place::Zero();  // its depth
   double length = 0., straight = 0.;         // mm
   cortex::EndAngles angles;
   bool arrived = false;
+
+  bool there() const { return !std::isnan(length); }
 };
 
 struct Measure {
@@ -59,20 +59,32 @@ constexpr Measure measures[] = {
 struct Options {
   fs::path outer, inner, out, values;
   std::string measure = "thickness", by = "volume";
-  double depth = .5, spacing = .3;
+  double depth = .5, spacing = .3, thinnest = .5;
   bool force = false;
 };
+
+// A vertex of no triangle lies on no surface: it stays where it is and nothing is known of it.
+Dropped none_at(const cortex::Place& place) {
+  return {.at = place, .length = NAN, .straight = NAN, .angles = {NAN, NAN}, .arrived = false};
+}
 
 std::vector<Dropped> drop_all(const Options& o, const Mesh& outer, const Mesh& inner, Progress& progress) {
   const cortex::Laplace field(outer, inner, {.spacing = o.spacing * 1e3}, progress);
   const cortex::Boundary above(outer, progress), below(inner, progress);
   const cortex::WCurves curves(field, above, below);
   const std::vector<Vec3> normals = vertex_normals(outer);
+  std::vector<std::uint8_t> used(outer.positions.size(), 0);
+  for (const Triangle& t : outer.triangles)
+    for (const std::uint32_t v : t) used[v] = 1;
   std::vector<Dropped> all(outer.positions.size());
   progress.begin("dropping w-curves", all.size());
   parallel_ranges(all.size(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t v = begin; v < end; ++v) {
       const cortex::Place start = outer.positions[v].cast<double>();
+      if (!used[v]) {
+        all[v] = none_at(start);
+        continue;
+      }
       const cortex::WCurve curve = curves.drop(start, -normals[v].cast<double>());
       all[v] = {o.by == "volume" ? curve.at(o.depth) : curve.at_length(o.depth), curve.length() / 1e3,
                 curves.straight_way(start) / 1e3, end_angles(curve, {above.tree(), below.tree()}),
@@ -96,38 +108,49 @@ void run(const Options& o, Console& console) {
 
   const auto measure = std::ranges::find(measures, o.measure, &Measure::name);
   std::vector<double> values, lengths, angles;
-  std::size_t arrived = 0;
+  std::size_t arrived = 0, without = 0, thin = 0;
   for (std::size_t v = 0; v < all.size(); ++v) {
     const Dropped& d = all[v];
     outer.positions[v] = d.at.cast<float>();
     values.push_back(measure->of(d));
-    arrived += d.arrived;
-    if (d.length >= no_tissue)
+    arrived += d.arrived, without += !d.there(), thin += d.length < o.thinnest;
+    if (d.length >= o.thinnest)
       lengths.push_back(d.length), angles.insert(angles.end(), {d.angles.outer, d.angles.inner});
   }
   std::vector<std::pair<fs::path, std::string>> files{{o.out, io::write_surface(outer, o.out.string())}};
   if (!o.values.empty()) files.emplace_back(o.values, io::write_surface_values(measure->title, values));
   write_unless_there(files, o.force);
 
+  const std::size_t curves = all.size() - without;
+  if (without)
+    console.warn(fmt::format(
+        "{}: {} of no triangle, which {} no curve; {} where {}, with nan as value", o.outer.string(),
+        without == 1 ? "a vertex is" : fmt::format("{} vertices are", without), without == 1 ? "has" : "have",
+        without == 1 ? "it stays" : "they stay", without == 1 ? "it is" : "they are"));
   if (lengths.empty())
     console.warn(
-        fmt::format("no curve is longer than {:g} mm, as tissue is; figures are of none", no_tissue));
+        fmt::format("no curve is as long as {:g} mm, so that no figures are told; where it is thinner, give "
+                    "a lower --thinnest",
+                    o.thinnest));
   const auto quantile = [](const std::vector<double>& of, double share) {
     return of.empty() ? NAN : statistics::quantile(of, share);  // null in JSON
   };
   const double thickness = quantile(lengths, .5), usual = quantile(angles, .5), far = quantile(angles, .99);
-  console.say(fmt::format("{} of {} reach the inner surface{}", arrived, counted(all.size(), "curve"),
-                          lengths.empty()
-                              ? std::string()
-                              : fmt::format("; {:.2f} mm long in the median; {:.2f}° off right angles in the "
-                                            "median, {:.1f}° at the 99th percentile",
-                                            thickness, usual, far)));
+  console.say(fmt::format(
+      "{} of {} reach the inner surface{}", arrived, counted(curves, "curve"),
+      lengths.empty() ? std::string()
+                      : fmt::format("; {:.2f} mm long in the median; {:.2f}° off right angles in the "
+                                    "median, {:.1f}° at the 99th percentile{}",
+                                    thickness, usual, far,
+                                    thin ? fmt::format("; {} shorter than {:g} mm left out", thin, o.thinnest)
+                                         : std::string())));
   console.say(fmt::format(
       "depth {} by {} in {}{}", o.depth, o.by, o.out.string(),
       o.values.empty() ? std::string()
                        : fmt::format("; {} ({}) in {}", measure->name, measure->what, o.values.string())));
-  console.print({{"curves", all.size()},
+  console.print({{"curves", curves},
                  {"reached", arrived},
+                 {"thin", thin},
                  {"thickness", thickness},
                  {"w_angle", {{"median", usual}, {"p99", far}}}});
 }
@@ -172,6 +195,11 @@ std::function<void()> cortex_curves(CLI::App& command, Console& console) {
       *command.add_option("--spacing", o->spacing, "Of the nodes of the field between the surfaces, mm")
            ->capture_default_str(),
       .05, 2.);
+  must_be_within(*command
+                      .add_option("--thinnest", o->thinnest,
+                                  "Shorter curves, as of the medial wall, are left out of what is told, mm")
+                      ->capture_default_str(),
+                 0., 5.);
   add_force(command, o->force);
   return [o, &console] { run(*o, console); };
 }

@@ -44,6 +44,16 @@ void tell_flat_ends(const cortex::ContourStack& stack, const std::string& name, 
           end == 0 ? "first" : "last", stack.sections[end].at / 1e3, areas[end] / 1e6, name));
 }
 
+// What is wrong with a stack is told with its file.
+cortex::Surfaces surfaces_of(const cortex::ContourStack& stack, const std::filesystem::path& file,
+                             const cortex::SurfaceOptions& options, Progress& progress) {
+  try {
+    return cortex::surfaces_from(stack, options, progress);
+  } catch (const Error& error) {
+    throw Error(fmt::format("{}: {}", file.string(), error.what()));
+  }
+}
+
 }  // namespace
 
 std::function<void()> cortex_surfaces(CLI::App& command, Console& console) {
@@ -108,14 +118,14 @@ std::function<void()> cortex_surfaces(CLI::App& command, Console& console) {
                         "more than that, or leave it out",
                         o->voxel, apart));
     }
-    const cortex::Surfaces made = cortex::surfaces_from(stack,
-                                                        {.voxel = 1e3 * o->voxel,
-                                                         .between = int(o->between),
-                                                         .margin = 1e3 * o->margin,
-                                                         .error = 1e3 * o->error,
-                                                         .outer = o->outer,
-                                                         .inner = o->inner},
-                                                        console.progress());
+    const cortex::Surfaces made = surfaces_of(stack, o->file,
+                                              {.voxel = 1e3 * o->voxel,
+                                               .between = int(o->between),
+                                               .margin = 1e3 * o->margin,
+                                               .error = 1e3 * o->error,
+                                               .outer = o->outer,
+                                               .inner = o->inner},
+                                              console.progress());
     write_unless_there({{o->out[0], io::write_surface(made.outer, o->out[0].string())},
                         {o->out[1], io::write_surface(made.inner, o->out[1].string())}},
                        true);

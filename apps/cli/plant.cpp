@@ -93,9 +93,9 @@ std::string sentence_of(const Unflattened& u) {
 void run(const Options& options, Console& console) {
   must_have_folder(options.out);
   io::must_take_sonata(options.out);
-  circuit::Recipe recipe = find_recipe(options.recipe);
-  if (!options.slice.empty()) correct_slices(recipe, options.slice);
   const bool curved = !options.elements.file.empty();
+  circuit::Recipe recipe = find_recipe(options.recipe, curved ? Tissue::elements : Tissue::column);
+  if (!options.slice.empty()) correct_slices(recipe, options.slice);
   PlantedElements all;
   if (curved)
     all = plant_in_elements(options.elements, recipe, options.repo, options.seed, console.progress());
@@ -163,10 +163,11 @@ void run(const Options& options, Console& console) {
 std::function<void()> plant(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
   command
-      .add_option("--recipe", options->recipe,
-                  "A recipe (TOML), or the name of one that ships: cortex-1000, column-1000, column-10000, "
-                  "human-frontal, "
-                  "human-visual, rat-barrel-column, rodent-types")
+      .add_option(
+          "--recipe", options->recipe,
+          "A recipe (TOML), or the name of one that ships: column-1000, column-10000, human-frontal, "
+          "human-visual, rat-barrel-column, rodent-types, and in a column cortex-1000, too, which needs no "
+          "--repo")
       ->required()
       ->type_name("FILE|NAME");
   command

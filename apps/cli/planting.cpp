@@ -196,20 +196,46 @@ std::vector<std::string> names_of(const std::vector<NeuronRow>& rows) {
   return names;
 }
 
+// Why it cannot be planted there, as what follows "recipe NAME"; empty where it can.
+std::string unfit(const circuit::Recipe& recipe, Tissue tissue) {
+  if (tissue == Tissue::column) return {};
+  for (std::size_t t = 0; t < recipe.types.size(); ++t)
+    if (const std::string& grammar = grammar_of(recipe, t); !grammar.empty())
+      return fmt::format("grows its type {} by grammar {} where it stands, which is done in columns alone",
+                         recipe.types[t].name, grammar);
+  return {};
+}
+
+// Those that can be planted there.
+std::vector<std::string> shipped_recipes(Tissue tissue) {
+  std::vector<std::string> names;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(data_folder() / "recipes", ignored))
+    if (entry.path().extension() == ".toml" && unfit(circuit::read_recipe(entry.path()), tissue).empty())
+      names.push_back(entry.path().stem().string());
+  std::ranges::sort(names);
+  return names;
+}
+
 }  // namespace
 
-circuit::Recipe find_recipe(const std::string& name_or_path) {
-  const fs::path folder = data_folder() / "recipes";
-  if (fs::exists(name_or_path)) return circuit::read_recipe(name_or_path);
-  if (const fs::path shipped = folder / (name_or_path + ".toml"); fs::exists(shipped))
-    return circuit::read_recipe(shipped);
-  std::set<std::string> names;
-  std::error_code ignored;
-  for (const auto& entry : fs::directory_iterator(folder, ignored))
-    if (entry.path().extension() == ".toml") names.insert(entry.path().stem().string());
-  throw InputError(name_or_path, 0,
-                   fmt::format("is neither a file nor a recipe that ships with Brain Forest; those are {}",
-                               fmt::join(names, ", ")));
+circuit::Recipe find_recipe(const std::string& name_or_path, Tissue tissue) {
+  const fs::path shipped = data_folder() / "recipes" / (name_or_path + ".toml");
+  const bool own = fs::exists(name_or_path);
+  if (!own && !fs::exists(shipped))
+    throw InputError(
+        name_or_path, 0,
+        fmt::format("is neither a file nor a recipe that ships with Brain Forest{}; those are {}",
+                    tissue == Tissue::elements ? " and can be planted in elements" : "",
+                    fmt::join(shipped_recipes(tissue), ", ")));
+  circuit::Recipe recipe = circuit::read_recipe(own ? fs::path(name_or_path) : shipped);
+  if (const std::string why = unfit(recipe, tissue); !why.empty())
+    throw Error(
+        fmt::format("recipe {} {}; grow such neurons into a repository (brainforest grow) and name their "
+                    "population in the "
+                    "recipe instead, or give {}",
+                    name_or_path, why, fmt::join(shipped_recipes(tissue), ", ")));
+  return recipe;
 }
 
 Stock stock_of(const circuit::Recipe& recipe, const std::vector<bool>& wanted, const std::string& repo,

@@ -14,8 +14,12 @@
 
 namespace forest::cli {
 
-/// The recipe at a path, or the one that ships under a name ("column-1000"). Throws InputError that lists the names.
-circuit::Recipe find_recipe(const std::string& name_or_path);
+/// What a recipe is planted in: one whose types grow where they stand, in columns alone.
+enum class Tissue : std::uint8_t { column, elements };
+
+/// The recipe at a path, or the one that ships under a name ("column-1000"). Throws Error that lists the names, for one that is
+/// not there and one that cannot be planted in that tissue.
+circuit::Recipe find_recipe(const std::string& name_or_path, Tissue tissue = Tissue::column);
 
 /// Neurons that were stretched along z, as their slice had shrunk.
 struct Unflattened {

@@ -286,13 +286,6 @@ std::vector<std::uint32_t> parse_elements(const std::string& text, const std::fi
 
 PlantedElements plant_in_elements(const ElementOptions& options, const circuit::Recipe& recipe,
                                   const std::string& repo, std::uint64_t seed, Progress& progress) {
-  for (std::size_t t = 0; t < recipe.types.size(); ++t)
-    if (const std::string& grammar = source_of(recipe, t).grammar; !grammar.empty())
-      throw Error(
-          fmt::format("neurons of type {} would grow by grammar {} where they stand, which is not so in "
-                      "elements; grow some "
-                      "into a repository (brainforest grow), and name their population instead",
-                      recipe.types[t].name, grammar));
   if (options.elements.empty() && options.near.empty() && options.sphere.empty() && options.box.empty() &&
       options.areas.empty())
     throw Error("say which elements are planted: --element, --region, --near, --sphere or --box");

@@ -26,6 +26,7 @@ namespace forest::cortex {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 // A ball whose radius (µm) depends on the direction.
 template <class Radius>
@@ -398,6 +399,7 @@ TEST_F(Shell, ElementsAreValidEvenWholeAndTheSameAtAnyNumberOfThreads) {
   EXPECT_EQ(cortex.w_reached, 1.);
   EXPECT_LT(cortex.w_angle.p99, 3.);
   EXPECT_LT(r.equivolume_error, .005);
+  EXPECT_LT(r.bulge_p99, 20.);
   EXPECT_LT(r.outer.value().p99, 30.);
   EXPECT_LT(r.inner.value().p99, 30.);
 
@@ -474,6 +476,14 @@ TEST(CheckSurfaces, NamesWhatIsWrong) {
   open.triangles.pop_back();
   EXPECT_THAT(refusal(open, inner), HasSubstr("outer surface is open"));
   EXPECT_THAT(refusal(open, inner), HasSubstr("at the edge of vertices"));
+  Mesh one_turned = outer;
+  std::swap(one_turned.triangles[7][0], one_turned.triangles[7][1]);
+  EXPECT_THAT(refusal(one_turned, inner),
+              HasSubstr("of the outer surface face opposite ways at the edge of"));
+  EXPECT_THAT(refusal(one_turned, inner), HasSubstr("triangles 4 and 7 of"));
+  Mesh doubled = outer;
+  doubled.triangles.push_back(doubled.triangles[7]);
+  EXPECT_THAT(refusal(doubled, inner), HasSubstr("3 triangles of the outer surface meet at the edge of"));
   Mesh flat = outer;
   flat.triangles[7][1] = flat.triangles[7][0];
   EXPECT_THAT(refusal(flat, inner), HasSubstr("triangle 7 of the outer surface has one vertex twice"));
@@ -492,6 +502,85 @@ TEST(CheckSurfaces, NamesWhatIsWrong) {
   EXPECT_THAT(refusal(ball(10., 3), ball(8., 3)), HasSubstr("check that it is in mm and not in m"));
   EXPECT_THAT(refusal(ball(1e7, 3), ball(8e6, 3)), HasSubstr("check that it is in mm and not in µm"));
   EXPECT_THAT(refusal(outer, ball(8., 3)), HasSubstr("check that both are in mm"));
+}
+
+// A ball with tunnels: a square of two triangles on either side, and a tube between them.
+Mesh with_handles(int count) {
+  constexpr int n = 24;
+  std::map<std::array<int, 3>, std::uint32_t> corners;
+  Mesh mesh;
+  const auto solid = [&](int x, int y, int z) {
+    const auto in = [](int c) { return c >= 0 && c < n; };
+    const bool tunnel = y / 4 == 2 && x % 6 / 2 == 1 && x / 6 < count;
+    return in(x) && in(y) && in(z) && !tunnel;
+  };
+  const auto corner = [&](std::array<int, 3> at) {
+    const auto [place, fresh] = corners.try_emplace(at, std::uint32_t(mesh.positions.size()));
+    if (fresh) mesh.positions.push_back(Vec3(float(at[0]), float(at[1]), float(at[2])) * 800.f);
+    return place->second;
+  };
+  for (int x = 0; x < n; ++x)
+    for (int y = 0; y < n; ++y)
+      for (int z = 0; z < n; ++z)
+        for (int axis = 0; axis < 3 && solid(x, y, z); ++axis)
+          for (const int side : {0, 1}) {
+            std::array<int, 3> next{x, y, z};
+            next[std::size_t(axis)] += side ? 1 : -1;
+            if (solid(next[0], next[1], next[2])) continue;
+            const auto at = [&](int u, int v) {
+              std::array<int, 3> c{x, y, z};
+              c[std::size_t(axis)] += side, c[std::size_t(axis + 1) % 3] += u,
+                  c[std::size_t(axis + 2) % 3] += v;
+              return corner(c);
+            };
+            const std::array q{at(0, 0), at(1, 0), at(1, 1), at(0, 1)};
+            for (const auto& [a, b, c] : {std::array{0, 1, 2}, std::array{0, 2, 3}})
+              mesh.triangles.push_back(
+                  {q[std::size_t(a)], q[std::size_t(side ? b : c)], q[std::size_t(side ? c : b)]});
+          }
+  mesh.labels.assign(mesh.positions.size(), 0);
+  return mesh;
+}
+
+TEST(CheckSurfaces, HandlesAreCountedAndPartsThatTouchAreNone) {
+  const Mesh inner = ball(3e3);
+  EXPECT_THAT(refusal(with_handles(1), inner), HasSubstr("the outer surface has 1 handle;"));
+  EXPECT_THAT(refusal(with_handles(2), inner), HasSubstr("the outer surface has 2 handles;"));
+  EXPECT_THAT(refusal(with_handles(0), inner), Not(HasSubstr("handle")));
+  Mesh touching = ball(10e3);
+  const auto size = std::uint32_t(touching.positions.size());
+  Mesh other = ball(1e3);
+  for (Vec3& p : other.positions) p += touching.positions[5] - 1.1f * other.positions[3];
+  append(touching, other);
+  for (Triangle& t : touching.triangles)
+    for (std::uint32_t& v : t)
+      if (v == size + 3) v = 5;
+  EXPECT_THAT(refusal(touching, inner), HasSubstr("the outer surface touches itself at vertex 5, ("));
+}
+
+TEST(CheckSurfaces, ACrossingIsToldAndADeepOneRefused) {
+  // A bump of 3 mm width on the inner surface, about which cortex is `thick`.
+  const auto inner = [](double size, double thick, double beyond) {
+    return star(5, [=](const Vec3& way) {
+      const double off = size * std::acos(std::clamp(double(way.dot(Vec3(.6f, 0.f, .8f))), -1., 1.));
+      return size - thick + (thick + beyond) * std::exp(-off * off / 2.25e6);
+    });
+  };
+  const Mesh outer = ball(10e3);
+  EXPECT_THAT(check_surfaces(outer, inner(10e3, 2e3, -100.)), ::testing::IsEmpty());
+  EXPECT_THAT(check_surfaces(outer, inner(10e3, 2e3, 50.)), ::testing::IsEmpty());
+  const auto oddities = check_surfaces(outer, inner(10e3, 2e3, 300.));
+  ASSERT_EQ(oddities.size(), 1u);
+  EXPECT_THAT(oddities[0],
+              ::testing::ContainsRegex(
+                  "^the surfaces cross: at [0-9]+ of 10242 vertices the inner one lies outside of the "
+                  "outer one, at [0-9]+ of 10242 vertices the outer one lies within the inner one, deepest "
+                  "by 0.(2[6-9]|30) mm at .[56].[0-9], -?0.[0-9], [78].[0-9]. mm"));
+  EXPECT_THAT(refusal(outer, inner(10e3, 2e3, 700.)), HasSubstr("the farthest by 0.6"));
+  // Half as thick, half as much: .3 mm is no accident.
+  const Mesh small = ball(5e3);
+  EXPECT_EQ(refusal(small, inner(5e3, 1e3, 200.)), "");
+  EXPECT_THAT(refusal(small, inner(5e3, 1e3, 300.)), HasSubstr("pull the inner one back there"));
 }
 
 TEST(CheckSurfaces, FewTrianglesThatCutAreToldAndManyRefused) {

@@ -190,8 +190,26 @@ std::optional<Place> twin_in(const std::vector<std::vector<Place>>& polygons) {
 
 }  // namespace
 
+double extent(const ContourStack& stack) {
+  if (stack.sections.empty()) return 0.;
+  Eigen::AlignedBox2d all;
+  for (const Section& section : stack.sections)
+    for (const Contour& contour : section.contours)
+      for (const Place& point : contour.curve.points) all.extend(point);
+  const double along = stack.sections.back().at - stack.sections.front().at;
+  return all.isEmpty() ? along : std::max(along, all.sizes().maxCoeff());
+}
+
+std::string too_small_for_a_brain(const ContourStack& stack) {
+  const double reach = extent(stack);
+  if (reach == 0. || reach >= smallest_brain) return {};
+  return fmt::format(
+      "the contours reach over {0:.3g} µm, as no brain does; look at their unit: in mm it would be {0:.3g} "
+      "mm",
+      reach);
+}
+
 std::string fault_of_numbers(const ContourStack& stack) {
-  Place low = Place::Constant(HUGE_VAL), high = -low;
   for (std::size_t i = 0; i < stack.sections.size(); ++i) {
     const Section& section = stack.sections[i];
     if (!std::isfinite(section.at)) return fmt::format("section {} is at no number; say where it is", i + 1);
@@ -210,14 +228,11 @@ std::string fault_of_numbers(const ContourStack& stack) {
               "a contour of '{}' in section {} ({:.6g} mm) has a coordinate that is no number; trace "
               "it again",
               object, i + 1, section.at / 1e3);
-      for (const Place& point : contour.curve.points) low = low.cwiseMin(point), high = high.cwiseMax(point);
     }
   }
-  double extent = stack.sections.empty() ? 0. : stack.sections.back().at - stack.sections.front().at;
-  if (low.x() <= high.x()) extent = std::max(extent, (high - low).maxCoeff());
-  if (extent > largest_brain)
+  if (const double reach = extent(stack); reach > largest_brain)
     return fmt::format("the contours spread over {:.3g} m, as no brain does; look at their unit",
-                       extent / 1e6);
+                       reach / 1e6);
   return {};
 }
 

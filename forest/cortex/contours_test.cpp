@@ -229,6 +229,20 @@ TEST(FaultOf, KnowsWhatReachesFartherThanABrain) {
   EXPECT_NE(fault_of_numbers(apart).find("spread over 2 m"), std::string::npos) << fault_of_numbers(apart);
 }
 
+TEST(TooSmallForABrain, IsWhatReachesLessFarThanAFlysBrain) {
+  const std::vector<Place> square{{0., 0.}, {27., 0.}, {27., 20.}, {0., 20.}};
+  ContourStack stack = drawn({square});
+  EXPECT_EQ(fault_of(stack), "");
+  EXPECT_EQ(too_small_for_a_brain(stack),
+            "the contours reach over 27 µm, as no brain does; look at their unit: in mm it would be 27 mm");
+  stack.sections.push_back(stack.sections[0]);
+  stack.sections[1].at += 600.;
+  EXPECT_EQ(extent(stack), 600.);
+  EXPECT_EQ(too_small_for_a_brain(stack), "");
+  stack.sections.clear();
+  EXPECT_EQ(too_small_for_a_brain(stack), "");
+}
+
 TEST(Only, KeepsObjectsThatAreNamedAndEverySection) {
   const std::vector<Place> square{{0., 0.}, {4000., 0.}, {4000., 4000.}, {0., 4000.}};
   ContourStack stack = drawn({square, square, square});

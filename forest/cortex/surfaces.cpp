@@ -309,6 +309,7 @@ Surfaces surfaces_from(const ContourStack& given, const SurfaceOptions& options,
                       inner_object = object_of(stack, options.inner);
   if (const std::string fault = fault_of_numbers(stack); !fault.empty()) throw Error(fault);
   const Raster raster = raster_of(stack, options);
+  if (const std::string fault = too_small_for_a_brain(stack); !fault.empty()) throw Error(fault);
   if (const std::string fault = fault_of(stack); !fault.empty()) throw Error(fault);
   for (const std::uint32_t object : {outer_object, inner_object}) must_go_on(stack, object);
   ScalarGrid inner = interpolated(stack, inner_object, raster, progress);

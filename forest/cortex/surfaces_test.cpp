@@ -198,6 +198,20 @@ TEST(SurfacesFrom, RefuseWhatCannotBeWithASentence) {
   ContourStack uneven = good;
   uneven.sections[5].at += 300.;
   EXPECT_NE(sentence(uneven).find("equal distances"), std::string::npos);
+  // A twenty-fifth of it is as large as a fly's brain; a thousandth is what was measured in mm and calls itself µm.
+  const auto shrunk = [&](double times) {
+    ContourStack stack = good;
+    for (Section& section : stack.sections) {
+      section.at *= times;
+      for (Contour& contour : section.contours)
+        for (Place& p : contour.curve.points) p *= times;
+    }
+    return stack;
+  };
+  EXPECT_EQ(sentence(shrunk(.04)), "");
+  EXPECT_NE(sentence(shrunk(.001)).find("as no brain does; look at their unit: in mm it would be 2"),
+            std::string::npos)
+      << sentence(shrunk(.001));
   ContourStack one = good;
   one.sections.resize(1);
   EXPECT_NE(sentence(one).find("two sections"), std::string::npos);

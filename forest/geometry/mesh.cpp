@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <compare>
 #include <map>
 #include <utility>
 
@@ -50,6 +51,29 @@ std::optional<std::array<std::uint32_t, 2>> open_edge(const Mesh& mesh) {
 }
 
 bool is_closed(const Mesh& mesh) { return !open_edge(mesh); }
+
+std::optional<std::uint32_t> pinched_vertex(const Mesh& mesh) {
+  // Around its corner at a vertex a triangle leads from one neighbour to the next: a fan comes back to where it began.
+  struct Step {
+    std::uint32_t vertex, from, to;
+    auto operator<=>(const Step&) const = default;
+  };
+  std::vector<Step> steps;
+  steps.reserve(3 * mesh.triangles.size());
+  for (const Triangle& t : mesh.triangles)
+    for (std::size_t i = 0; i < 3; ++i) steps.push_back({t[i], t[(i + 1) % 3], t[(i + 2) % 3]});
+  std::ranges::sort(steps);
+  for (std::size_t begin = 0, end = 0; begin < steps.size(); begin = end) {
+    while (end < steps.size() && steps[end].vertex == steps[begin].vertex) ++end;
+    const std::span<const Step> own(&steps[begin], end - begin);
+    std::size_t walked = 0;
+    for (std::uint32_t at = own[0].from; walked < own.size(); ++walked) {
+      if (walked && at == own[0].from) return own[0].vertex;
+      at = std::ranges::lower_bound(own, at, {}, &Step::from)->to;
+    }
+  }
+  return {};
+}
 
 std::size_t count_pieces(const Mesh& mesh) {
   Unions together(mesh.positions.size());

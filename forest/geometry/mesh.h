@@ -38,6 +38,8 @@ void append(Mesh& mesh, const Mesh& other);
 bool is_closed(const Mesh& mesh);
 /// An edge where that is not so: its two vertices. The first in their order.
 std::optional<std::array<std::uint32_t, 2>> open_edge(const Mesh& mesh);
+/// A vertex of a closed mesh in which two of its parts touch: its triangles lie around it in several fans, not in one. The first.
+std::optional<std::uint32_t> pinched_vertex(const Mesh& mesh);
 /// Number of pieces that share no vertex; vertices of no triangle do not count.
 std::size_t count_pieces(const Mesh& mesh);
 /// Of a closed mesh, by the divergence theorem; µm³, positive when triangles face outwards.

@@ -77,5 +77,19 @@ TEST(Mesh, AHoleATurnedTriangleAndATwiceUsedEdgeAreNotClosed) {
   EXPECT_FALSE(is_closed(doubled));
 }
 
+TEST(Mesh, PartsThatShareAVertexArePinchedThere) {
+  Mesh mesh = icosphere({0, 0, 0}, 1.f, 1, 1);
+  EXPECT_FALSE(pinched_vertex(mesh));
+  const auto size = std::uint32_t(mesh.positions.size());
+  append(mesh, icosphere({2, 0, 0}, 1.f, 1, 1));
+  EXPECT_FALSE(pinched_vertex(mesh));
+  for (Triangle& t : mesh.triangles)
+    for (std::uint32_t& v : t)
+      if (v == size + 3) v = 5;
+  EXPECT_TRUE(is_closed(mesh));
+  EXPECT_EQ(count_pieces(mesh), 1u);
+  EXPECT_EQ(pinched_vertex(mesh), 5u);
+}
+
 }  // namespace
 }  // namespace forest

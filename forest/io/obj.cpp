@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/io/obj.h"
 
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
 #include "forest/core/number.h"
+#include "forest/geometry/weld.h"
 #include "forest/io/surface.h"
 #include "forest/io/words.h"
 
@@ -141,7 +143,7 @@ Mesh read_obj_surface(std::string_view text, const std::string& name) {
   Mesh mesh = first_words(text).starts_with('P') ? read_mni(text, name) : read_wavefront(text, name);
   mesh.labels.assign(mesh.positions.size(), 0);
   if (mesh.triangles.empty()) throw InputError(name, 0, "has no triangle; give a surface that is not empty");
-  return mesh;
+  return welded_if_open(std::move(mesh));
 }
 
 }  // namespace forest::io

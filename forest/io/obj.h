@@ -6,7 +6,8 @@
 //   MNI OBJ         of the Montreal Neurological Institute (MacDonald 1990s), as CIVET and BigBrain have them: "P", five numbers
 //                   of how it looks, n; n points, n normals, m; colours; m ends of faces; corners of all faces, counted from 0
 //
-// Lengths are taken as mm, which neither names. Faces of more than three corners become fans of triangles.
+// Lengths are taken as mm, which neither names. Faces of more than three corners become fans of triangles. Corners of faces at the
+// very same places become one vertex where that closes the surface (geometry/weld.h).
 #pragma once
 
 #include <string>

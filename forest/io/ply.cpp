@@ -7,12 +7,14 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
 #include "forest/core/number.h"
+#include "forest/geometry/weld.h"
 #include "forest/io/surface.h"
 #include "forest/io/words.h"
 
@@ -209,7 +211,7 @@ Mesh read_ply_surface(std::string_view bytes, const std::string& name) {
   mesh.labels.assign(mesh.positions.size(), 0);
   if (mesh.triangles.empty()) throw InputError(name, 0, "has no triangle; give a surface that is not empty");
   check_corners(mesh, name);
-  return mesh;
+  return welded_if_open(std::move(mesh));
 }
 
 }  // namespace forest::io

@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/io/stl.h"
 
-#include <array>
 #include <bit>
 #include <cstdint>
 #include <cstring>
-#include <unordered_map>
 
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
 #include "forest/core/number.h"
+#include "forest/geometry/weld.h"
 #include "forest/io/surface.h"
 #include "forest/io/words.h"
 
@@ -40,56 +39,28 @@ bool is_text(std::string_view bytes) {
   return false;
 }
 
-// Corners by their place.
-class Welded {
- public:
-  explicit Welded(const std::string& name) : name_(name) {}
-
-  std::uint32_t corner(Vec3 at) {
-    for (float& x : at) x += 0.f;  // minus zero is zero
-    const std::array<std::uint32_t, 3> key{std::bit_cast<std::uint32_t>(at[0]),
-                                           std::bit_cast<std::uint32_t>(at[1]),
-                                           std::bit_cast<std::uint32_t>(at[2])};
-    const auto [place, fresh] = known_.try_emplace(key, std::uint32_t(mesh.positions.size()));
-    if (fresh) mesh.positions.push_back(micrometres(at, name_, mesh.positions.size()));
-    return place->second;
-  }
-  // Two corners at one place make it none.
-  void triangle(const Triangle& t) {
-    if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) mesh.triangles.push_back(t);
-  }
-
-  Mesh mesh;
-
- private:
-  struct Hash {
-    std::size_t operator()(const std::array<std::uint32_t, 3>& key) const {
-      std::uint64_t h = 0x9e3779b97f4a7c15u;
-      for (const std::uint32_t x : key) h = (h ^ x) * 0xff51afd7ed558ccdu, h ^= h >> 29;
-      return std::size_t(h);
-    }
-  };
-  const std::string& name_;
-  std::unordered_map<std::array<std::uint32_t, 3>, std::uint32_t, Hash> known_;
-};
+std::uint32_t add_corner(Mesh& mesh, const Vec3& at, const std::string& name) {
+  mesh.positions.push_back(micrometres(at, name, mesh.positions.size()));
+  return std::uint32_t(mesh.positions.size() - 1);
+}
 
 Mesh read_binary(std::string_view bytes, const std::string& name) {
-  Welded welded(name);
+  Mesh mesh;
   for (std::size_t at = head; at < bytes.size(); at += record) {
     Triangle triangle{};
     for (std::size_t k = 0; k < 3; ++k) {
       Vec3 place;
       for (std::size_t a = 0; a < 3; ++a)
         place[Eigen::Index(a)] = std::bit_cast<float>(little_endian(bytes, at + 12 * (k + 1) + 4 * a));
-      triangle[k] = welded.corner(place);
+      triangle[k] = add_corner(mesh, place, name);
     }
-    welded.triangle(triangle);
+    mesh.triangles.push_back(triangle);
   }
-  return std::move(welded.mesh);
+  return mesh;
 }
 
 Mesh read_text(std::string_view text, const std::string& name) {
-  Welded welded(name);
+  Mesh mesh;
   std::size_t number = 0, corners = 0;
   Triangle triangle{};
   bool open = false;  // between solid and endsolid
@@ -112,17 +83,17 @@ Mesh read_text(std::string_view text, const std::string& name) {
       }
       if (corners == 3)
         throw InputError(name, number, "a facet has more than three corners; write it as triangles");
-      triangle[corners++] = welded.corner(at);
+      triangle[corners++] = add_corner(mesh, at, name);
     }
     if (word == "endfacet") {
       if (corners != 3)
         throw InputError(name, number, fmt::format("a facet has {} corners, not three; mend it", corners));
-      welded.triangle(triangle);
+      mesh.triangles.push_back(triangle);
       corners = 0;
     }
   }
   if (open) throw InputError(name, number, "ends before 'endsolid'; get the whole file");
-  return std::move(welded.mesh);
+  return mesh;
 }
 
 }  // namespace
@@ -130,7 +101,7 @@ Mesh read_text(std::string_view text, const std::string& name) {
 bool is_stl(std::string_view bytes) { return is_binary(bytes) || is_text(bytes); }
 
 Mesh read_stl_surface(std::string_view bytes, const std::string& name) {
-  Mesh mesh = is_binary(bytes) ? read_binary(bytes, name) : read_text(bytes, name);
+  Mesh mesh = welded(is_binary(bytes) ? read_binary(bytes, name) : read_text(bytes, name));
   mesh.labels.assign(mesh.positions.size(), 0);
   if (mesh.triangles.empty()) throw InputError(name, 0, "has no triangle; give a surface that is not empty");
   return mesh;

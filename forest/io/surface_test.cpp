@@ -226,6 +226,51 @@ TEST(Surface, OfEitherObjIsTheSame) {
             (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}}));
 }
 
+std::string binary_stl() {
+  std::string bytes = "solid as some programs begin it" + std::string(49, ' ');
+  const std::uint32_t count = 4;
+  bytes += raw(&count, 1, false);
+  for (const auto& c : corners) {
+    bytes += std::string(12, '\0');
+    for (const std::uint32_t corner : c) bytes += raw(&places[corner][0], 3, false);
+    bytes += "\x12\x34";
+  }
+  return bytes;
+}
+// As some programs write every triangle, or every face of one colour.
+TEST(Surface, TrianglesWithCornersOfTheirOwnHangTogetherInObjAndPlyAsInStl) {
+  std::string obj, ply_places, ply_faces, mni_ends, mni_corners;
+  int count = 0;
+  for (const auto& c : corners) {
+    for (const std::uint32_t corner : c) {
+      const auto& p = places[corner];
+      obj += fmt::format("v {} {} {}\n", p[0], p[1], p[2]);
+      ply_places += fmt::format("{} {} {}\n", p[0], p[1], p[2]);
+    }
+    count += 3;
+    obj += "f -3 -2 -1\n", ply_faces += fmt::format("3 {} {} {}\n", count - 3, count - 2, count - 1);
+    mni_ends += fmt::format(" {}", count),
+        mni_corners += fmt::format(" {} {} {}", count - 3, count - 2, count - 1);
+  }
+  const Mesh as_stl = read_surface(binary_stl(), "s.stl");
+  const auto same = [&](const Mesh& mesh) {
+    EXPECT_EQ(mesh.positions, as_stl.positions);
+    EXPECT_EQ(mesh.triangles, as_stl.triangles);
+    EXPECT_EQ(mesh.labels.size(), 4u);
+  };
+  same(read_surface(obj, "s.obj"));
+  same(
+      read_surface("ply\nformat ascii 1.0\nelement vertex 12\nproperty float x\nproperty float y\n"
+                   "property float z\nelement face 4\nproperty list uchar int vertex_indices\nend_header\n" +
+                       ply_places + ply_faces,
+                   "s.ply"));
+  std::string normals;
+  for (int i = 0; i < 12; ++i) normals += " 0 0 1";
+  same(read_surface(fmt::format("P 0.3 0.3 0.4 10 1 12\n{}{}\n4\n0 1 1 1 1\n{}\n{}\n", ply_places, normals,
+                                mni_ends, mni_corners),
+                    "s.obj"));
+}
+
 TEST(Surface, ObjThatIsCutOffOrCannotBeIsRefusedWithItsLine) {
   const std::string whole = mni();
   for (std::size_t size = 0; size + 2 < whole.size(); ++size)
@@ -272,17 +317,6 @@ std::string text_stl() {
     text += "    endloop\n  endfacet\n";
   }
   return text + "endsolid made for a test\n";
-}
-std::string binary_stl() {
-  std::string bytes = "solid as some programs begin it" + std::string(49, ' ');
-  const std::uint32_t count = 4;
-  bytes += raw(&count, 1, false);
-  for (const auto& c : corners) {
-    bytes += std::string(12, '\0');
-    for (const std::uint32_t corner : c) bytes += raw(&places[corner][0], 3, false);
-    bytes += "\x12\x34";
-  }
-  return bytes;
 }
 TEST(Surface, OfPlyAndStlIsTheSameAsTextAndAsBytes) {
   for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"}) {

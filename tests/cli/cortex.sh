@@ -14,6 +14,13 @@ write("outer", ball(9, dent=1.2))
 write("inner", ball(7, dent=1.2))
 p, f = ball(9)
 write("open", (p, f[:-1]))
+write("turned", (p, f[:7] + [(f[7][0], f[7][2], f[7][1])] + f[8:]))
+with open("loose.obj", "w") as o:  # each triangle with corners of its own
+    for q in f:
+        for c in q: o.write("v %.9g %.9g %.9g\n" % p[c])
+        o.write("f -3 -2 -1\n")
+bump = lambda q, more: tuple(x * (1 + more * math.exp(-((q[0] / 1.5) ** 2 + (q[1] / 1.5) ** 2)) * (q[2] > 0)) for x in q)
+write("poking", ([bump(q, 2.3 / 7) for q in ball(7)[0]], f))  # through the outer one, by .3 mm at its top
 def border(name, vertices, count):
     open(name, "w").write(f"""<?xml version="1.0"?><BorderFile Version="3" SurfaceNumberOfVertices="{count}"><Class Name="all">
 <Border Name="{name.split('.')[0]}"><BorderPart Closed="False"><Vertices>{" ".join(f"{v} {v} {v}" for v in vertices)}</Vertices>
@@ -70,7 +77,7 @@ assert built["w_reached"] == 1 and built["w_angle"]["median"] < 3, built
 assert report["bok"]["l1"] < .97 and report["bok"]["l1"] < report["bok"]["l6"], report  # the dent is a fundus
 for found in built, report:
     assert {"elements", "uncertified", "volume_error", "volume_mean", "volume_within", "w_angle", "w_reached",
-            "equivolume_error", "scaled_jacobian", "border_within_2mm", "symmetry", "seconds", "peak_bytes"} <= set(found), found
+            "equivolume_error", "layer_bulge", "scaled_jacobian", "border_within_2mm", "symmetry", "seconds", "peak_bytes"} <= set(found), found
     assert set(found["symmetry"]) == {"elements", "best_planar", "stretches"} and found["border_within_2mm"] is None, found
     assert set(found["scaled_jacobian"]) == {"min", "p1"} and set(found["w_angle"]) == {"median", "p99"}, found
     assert found["bok"] == report["bok"] and found["symmetry"] == report["symmetry"], found
@@ -124,9 +131,12 @@ refuses 'cut.stl: is not as long as' $BRAINFOREST cortex build outer cut.stl -o 
 
 # Nothing is written where something is wrong.
 refuses 'swapped' $BRAINFOREST cortex build inner outer -o no.h5
-refuses 'outer surface is open or not of one orientation at the edge of vertices' $BRAINFOREST cortex build open inner -o no.h5
+refuses 'outer surface is open at the edge of vertices' $BRAINFOREST cortex build open inner -o no.h5
+refuses 'triangles 4 and 7 of the outer surface face opposite ways at the edge of vertices' $BRAINFOREST cortex build turned inner -o no.h5
 refuses 'check that it is in mm and not in m' $BRAINFOREST cortex build small small -o no.h5
 refuses 'check that it is in mm and not in µm' $BRAINFOREST cortex build large inner -o no.h5
+$BRAINFOREST cortex build loose.obj poking --volume 8 -o poked.h5 >/dev/null 2>told.txt
+grep -qE '^the surfaces cross: at [0-9]+ of 2562 vertices the inner one lies outside of the outer one, .* deepest by 0.(2|3)' told.txt
 refuses 'vertices of the outer surface scatter by' $BRAINFOREST cortex build cut_itself inner -o no.h5
 refuses '1 of 2562 vertices of the inner surface lie outside' $BRAINFOREST cortex build outer spike -o no.h5
 (ulimit -f 100; refuses 'no.h5: cannot be written' $BRAINFOREST cortex build outer inner --volume 8 -o no.h5)
@@ -177,6 +187,24 @@ for by in volume length; do
 done
 # Half of the volume of a convex shell lies outside of the middle of its curves.
 python3 -c 'import json; v, l = (json.load(open(f"{by}.json"))[0]["mean"] for by in ("volume", "length")); assert .9 < l < 1.1 and l + .02 < v < l + .3, (v, l)'
+# A vertex of no triangle has no thickness, and a thin shell one where that is asked for.
+python3 - <<'PY'
+from balls import ball, write
+p, f = ball(9, dent=1.2)
+write("stray", (p + [(0., 0., 8.)], f))
+write("thick", ball(9, 3))
+write("near", ball(8.7, 3))
+PY
+$BRAINFOREST cortex curves stray inner -o stray.gii --values stray.txt --json >stray.json 2>told.txt
+grep -q '^stray: a vertex is of no triangle, which has no curve; it stays where it is, with nan as value' told.txt
+[ "$(tail -1 stray.txt)" = nan ] && [ "$(grep -c nan stray.txt)" = 1 ]
+head -2563 stray.txt | cmp - thick.txt
+told stray.json 'd["curves"] == d["reached"] == 2562'
+$BRAINFOREST cortex curves thick near -o near.gii --json >near.json 2>told.txt
+grep -q 'no curve is as long as 0.5 mm.* give a lower --thinnest' told.txt
+told near.json 'd["thickness"] is None and d["thin"] == d["curves"] == 642'
+$BRAINFOREST cortex curves thick near -o near.gii --thinnest .1 --force --json >near.json
+told near.json '.28 < d["thickness"] < .32 and d["thin"] == 0'
 refuses 'already' $BRAINFOREST cortex curves outer inner -o middle
 refuses 'is read here' $BRAINFOREST cortex curves outer inner -o inner --force
 refuses 'swapped' $BRAINFOREST cortex curves inner outer -o no.gii
@@ -310,6 +338,17 @@ sed 's/"unit": "um"/"unit": "mm"/' s.contours >mm.contours
 refuses 'look at their unit' $BRAINFOREST cortex contours mm.contours -o no.contours
 refuses 'look at their unit' $BRAINFOREST cortex compare mm.contours
 refuses 'look at their unit' $BRAINFOREST cortex surfaces mm.contours -o no.gii no2.gii
+python3 - <<'PY2'
+import json
+d = json.load(open("s.contours"))
+for s in d["sections"]:
+    s["at"] /= 1000
+    for c in s["contours"]: c.update({k: [[x / 1000 for x in p] for p in c[k]] for k in ("curve", "polygon") if k in c})
+json.dump(d, open("um.contours", "w"))
+PY2
+refuses 'um.contours: the contours reach over 2' $BRAINFOREST cortex surfaces um.contours -o no.gii no2.gii
+$BRAINFOREST cortex contours um.contours -o small.contours --straight >/dev/null 2>told.txt
+grep -q '^um.contours: the contours reach over 2[0-9.]* µm, as no brain does' told.txt
 
 # Contours that cross, and objects that were swapped.
 python3 - <<'PY2'

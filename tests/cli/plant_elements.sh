@@ -57,6 +57,15 @@ cmp one/nodes.h5 no_column/nodes.h5
 refuses 'speaks of no column' $BRAINFOREST plant --recipe tissue.toml --repo cells.db --out no
 [ ! -e no ]
 
+# What grows where it stands is for columns, and only what is not is offered.
+fails_with 1 'recipe cortex-1000 grows its type L2/3 pyramidal cell by grammar tufted where it stands, which is done in columns alone' \
+  $BRAINFOREST plant --elements e.h5 --recipe cortex-1000 --element 7 --out no
+grep -q 'or give column-1000, column-10000, human-frontal' err.txt
+fails_with 1 'those are column-1000, column-10000, human-frontal, human-visual, rat-barrel-column, rodent-types' \
+  $BRAINFOREST plant --elements e.h5 --recipe human-frontl --element 7 --out no
+fails_with 1 'those are column-1000, column-10000, cortex-1000,' $BRAINFOREST plant --recipe human-frontl --out no
+[ ! -e no ]
+
 # The lines that bound the element, and the way up.
 python3 - <<'PY'
 import json
